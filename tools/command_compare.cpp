@@ -158,6 +158,68 @@ std::string scoresOf(const Scores& scores, const std::string& worstOf) {
         c.worst.difference, c.differentPixels, c.pixels);
 }
 
+Result<std::optional<Image<std::uint8_t>>> openMask(const CompareOptions& o, Program& program) {
+    std::optional<Image<std::uint8_t>> mask;
+    if (o.mask.empty()) return mask;
+    STX_TRY(const auto loaded, openPicture(o.mask, program.job));
+    if (loaded.isLinear())
+        return fail(ErrorCode::usage, "--mask '{}' must be an 8-bit image", o.mask);
+    mask.emplace(loaded.coded.width(), loaded.coded.height());
+    for (std::size_t i = 0; i < mask->count(); ++i) mask->pixels()[i] = loaded.coded.pixels()[i].x;
+    return mask;
+}
+
+/// All pairs of two folders or two sequences.
+struct ManyScores {
+    Scores total;
+    nlohmann::ordered_json perPair = nlohmann::ordered_json::array();
+    Pair worst;
+    Steadiness steadiness;  ///< of sequences
+};
+
+Result<ManyScores> compareMany(const CompareOptions& o, bool folders,
+                               const Image<std::uint8_t>* mask, Program& program) {
+    ManyScores many;
+    std::vector<Pair> pairs;
+    if (folders) {
+        STX_TRY(pairs, pairsOfFolders(o));
+    } else {
+        pairs = pairsOfSequences(o);
+    }
+    SequenceComparison sequence(255.0);
+    for (const Pair& pair : pairs) {
+        STX_CHECK(program.job.checkCancelled());
+        CompareOptions one = o;
+        one.errorPicture = pair.errorPicture(o.errorPicture);
+        if (!one.errorPicture.empty()) STX_CHECK(checkTarget(one.errorPicture, program));
+        STX_TRY(const auto c, comparePair(pair.a, pair.b, one, mask,
+                                          folders ? nullptr : &many.steadiness, program));
+        sequence.add(c.plain);
+        many.total.immersive.add(c.immersive);
+        auto entry = toJson(c);
+        if (folders)
+            entry["name"] = pair.name;
+        else
+            entry["frame"] = pair.frame;
+        many.perPair.push_back(std::move(entry));
+        if (folders && program.common.format != "json")
+            program.print(printable(pair.name) + ": " + scoresOf(c, "") + "\n");
+    }
+    many.total.plain = sequence.total();
+    many.worst = pairs[static_cast<std::size_t>(sequence.worstFrame())];
+    return many;
+}
+
+/// 0 where the pictures are the same or near enough to what was asked for.
+int exitCodeOf(const Scores& total, const CompareOptions& o) {
+    if (total.plain.identical()) return 0;
+    const auto psnr = total.plain.psnrRgb;
+    const bool near = !o.minPsnr || (psnr && *psnr >= *o.minPsnr);
+    const bool alike = !o.minSsim || total.plain.ssimY >= *o.minSsim;
+    if ((o.minPsnr || o.minSsim) && near && alike) return 0;
+    return static_cast<int>(ErrorCode::difference);
+}
+
 Result<int> compareImages(const CompareOptions& o, const Command& command, Program& program) {
     const bool sequences = frameName(o.a, 0) && frameName(o.b, 0);
     std::error_code ec;
@@ -173,84 +235,43 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
                     "--error-picture is '{}', one file for all frames; a numbered name is "
                     "expected, as in 'error_%04d.png'",
                     o.errorPicture);
-    std::optional<Image<std::uint8_t>> mask;
-    if (!o.mask.empty()) {
-        STX_TRY(const auto loaded, openPicture(o.mask, program.job));
-        if (loaded.isLinear())
-            return fail(ErrorCode::usage, "--mask '{}' must be an 8-bit image", o.mask);
-        mask.emplace(loaded.coded.width(), loaded.coded.height());
-        for (std::size_t i = 0; i < mask->count(); ++i)
-            mask->pixels()[i] = loaded.coded.pixels()[i].x;
-    }
+    STX_TRY(const auto mask, openMask(o, program));
     const auto* maskImage = mask ? &*mask : nullptr;
 
-    Scores total;
-    auto perFrame = nlohmann::ordered_json::array();
-    int worstFrame = -1;
-    Steadiness steadiness;
+    ManyScores many;
     std::string worstOf;
-    if (sequences || folders) {
-        std::vector<Pair> pairs;
-        if (folders) {
-            STX_TRY(pairs, pairsOfFolders(o));
-        } else {
-            pairs = pairsOfSequences(o);
-        }
-        SequenceComparison sequence(255.0);
-        for (const Pair& pair : pairs) {
-            STX_CHECK(program.job.checkCancelled());
-            CompareOptions one = o;
-            one.errorPicture = pair.errorPicture(o.errorPicture);
-            if (!one.errorPicture.empty()) STX_CHECK(checkTarget(one.errorPicture, program));
-            STX_TRY(const auto c, comparePair(pair.a, pair.b, one, maskImage,
-                                              folders ? nullptr : &steadiness, program));
-            sequence.add(c.plain);
-            total.immersive.add(c.immersive);
-            auto entry = toJson(c);
-            if (folders)
-                entry["name"] = pair.name;
-            else
-                entry["frame"] = pair.frame;
-            perFrame.push_back(std::move(entry));
-            if (folders && program.common.format != "json")
-                program.print(printable(pair.name) + ": " + scoresOf(c, "") + "\n");
-        }
-        total.plain = sequence.total();
-        const Pair& worst = pairs[static_cast<std::size_t>(sequence.worstFrame())];
-        worstFrame = worst.frame;
-        worstOf = folders ? " of '" + printable(worst.name) + "'"
-                          : fmt::format(" of frame {}", worst.frame);
-    } else {
-        STX_TRY(total, comparePair(o.a, o.b, o, maskImage, nullptr, program));
-    }
-
     nlohmann::ordered_json out = {{"$schema", "compare.schema.json"}};
-    out.update(toJson(total));
-    if (worstFrame >= 0) out["worst"]["frame"] = worstFrame;
-    if (!perFrame.empty()) out[folders ? "pairs" : "frames"] = perFrame;
+    if (sequences || folders) {
+        STX_TRY(many, compareMany(o, folders, maskImage, program));
+        worstOf = folders ? " of '" + printable(many.worst.name) + "'"
+                          : fmt::format(" of frame {}", many.worst.frame);
+        out.update(toJson(many.total));
+        if (!folders) out["worst"]["frame"] = many.worst.frame;
+        out[folders ? "pairs" : "frames"] = many.perPair;
+    } else {
+        STX_TRY(many.total, comparePair(o.a, o.b, o, maskImage, nullptr, program));
+        out.update(toJson(many.total));
+    }
+    const Steadiness& steadiness = many.steadiness;
+    const int worstStep = o.firstFrame + steadiness.worstFrame();
     if (steadiness.steps() > 0)
         out["unsteadiness"] = {
             {"mean", steadiness.mean()},
             {"worst", steadiness.worst()},
-            {"worstFrame", o.firstFrame + steadiness.worstFrame()},
+            {"worstFrame", worstStep},
         };
     STX_CHECK(program.writeReport(out));
     if (program.common.format == "json") {
         program.printJson(out);
     } else {
-        program.print((folders ? "all: " : "") + scoresOf(total, worstOf) + "\n");
+        program.print((folders ? "all: " : "") + scoresOf(many.total, worstOf) + "\n");
         if (steadiness.steps() > 0)
             program.print(fmt::format(
                 "changes from frame to frame: {:.3f} beyond those of B, {:.3f} at worst (frame "
                 "{})\n",
-                steadiness.mean(), steadiness.worst(), o.firstFrame + steadiness.worstFrame()));
+                steadiness.mean(), steadiness.worst(), worstStep));
     }
-    if (total.plain.identical()) return 0;
-    const auto psnr = total.plain.psnrRgb;
-    const bool near = !o.minPsnr || (psnr && *psnr >= *o.minPsnr);
-    const bool alike = !o.minSsim || total.plain.ssimY >= *o.minSsim;
-    if ((o.minPsnr || o.minSsim) && near && alike) return 0;
-    return static_cast<int>(ErrorCode::difference);
+    return exitCodeOf(many.total, o);
 }
 
 }  // namespace

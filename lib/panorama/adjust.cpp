@@ -150,94 +150,124 @@ double costOf(const TurnModel& model, const std::vector<Pair>& pairs, const Adju
     return cost;
 }
 
+/// Where each unknown is in the equations; SIZE_MAX where there is none.
+struct Unknowns {
+    std::vector<std::size_t> turn;  ///< three for each known picture but the first
+    std::vector<std::size_t>
+        stretch;  ///< one for each known picture, with AdjustSettings::ownFocals
+    std::size_t focal = 0, corner = 0, count = 0;
+
+    Unknowns(const TurnModel& model, const AdjustSettings& s)
+        : turn(model.known.size(), SIZE_MAX), stretch(model.known.size(), SIZE_MAX) {
+        bool first = true;
+        for (std::size_t k = 0; k < turn.size(); ++k) {
+            if (!model.known[k]) continue;
+            if (!first) {
+                turn[k] = count;
+                count += 3;
+            }
+            first = false;
+        }
+        focal = count++;
+        corner = count++;
+        for (std::size_t k = 0; s.ownFocals && k < turn.size(); ++k)
+            if (model.known[k]) stretch[k] = count++;
+    }
+
+    /// Those of the block of a pair.
+    [[nodiscard]] std::array<std::size_t, kOwn> of(const Pair& pair,
+                                                   const AdjustSettings& s) const {
+        const auto a = static_cast<std::size_t>(pair.a), b = static_cast<std::size_t>(pair.b);
+        std::array<std::size_t, kOwn> index{};
+        for (std::size_t i = 0; i < 3; ++i) {
+            index[i] = turn[a] == SIZE_MAX ? SIZE_MAX : turn[a] + i;
+            index[3 + i] = turn[b] == SIZE_MAX ? SIZE_MAX : turn[b] + i;
+        }
+        index[6] = s.fixFocal ? SIZE_MAX : focal;
+        index[7] = s.fixDistortion ? SIZE_MAX : corner;
+        index[8] = stretch[a];
+        index[9] = stretch[b];
+        return index;
+    }
+};
+
+double cornerOf(const TurnModel& model) {
+    return model.lens.k1 / (model.lens.focal * model.lens.focal);
+}
+
+/// The normal equations of one step: `matrix` by rows.
+struct Equations {
+    std::vector<double> matrix, right;
+};
+
+Equations equationsOf(const TurnModel& model, const std::vector<Pair>& pairs,
+                      const AdjustSettings& s, const Unknowns& at) {
+    const std::size_t n = at.count;
+    Equations e{std::vector<double>(n * n, 0.0), std::vector<double>(n, 0.0)};
+    const auto blocks = blocksOf(model, pairs, s, true);
+    for (std::size_t p = 0; p < pairs.size(); ++p) {
+        const auto index = at.of(pairs[p], s);
+        for (std::size_t i = 0; i < kOwn; ++i) {
+            if (index[i] == SIZE_MAX) continue;
+            e.right[index[i]] += blocks[p].right[i];
+            for (std::size_t j = 0; j < kOwn; ++j)
+                if (index[j] != SIZE_MAX)
+                    e.matrix[index[i] * n + index[j]] += blocks[p].matrix[i * kOwn + j];
+        }
+    }
+    // What is expected of the lens, against the noise of the matches.
+    const double noise = s.noisePixels * s.noisePixels;
+    const auto expect = [&](std::size_t i, double spread, double off, bool fixed) {
+        const double weight = noise / (spread * spread);
+        e.matrix[i * n + i] += weight;
+        if (!fixed) e.right[i] -= weight * off;
+    };
+    expect(at.focal, s.focalSpread, std::log(model.lens.focal / s.expectedFocal), s.fixFocal);
+    expect(at.corner, kDistortionSpread, cornerOf(model), s.fixDistortion);
+    for (std::size_t c = 0; c < at.stretch.size(); ++c)
+        if (at.stretch[c] != SIZE_MAX)
+            expect(at.stretch[c], kStretchSpread, model.stretch[c], false);
+    return e;
+}
+
+/// The model after a step; steps of the lens are held back, since the equations are true nearby
+/// only.
+TurnModel movedBy(const TurnModel& model, const std::vector<double>& step, const Unknowns& at,
+                  const AdjustSettings& s) {
+    TurnModel moved = model;
+    for (std::size_t c = 0; c < at.turn.size(); ++c) {
+        const std::size_t t = at.turn[c];
+        if (t != SIZE_MAX)
+            moved.worldFromCamera[c] = glm::normalize(quatOf({step[t], step[t + 1], step[t + 2]}) *
+                                                      moved.worldFromCamera[c]);
+        if (at.stretch[c] != SIZE_MAX)
+            moved.stretch[c] = std::clamp(moved.stretch[c] + step[at.stretch[c]], -0.1, 0.1);
+    }
+    const double logFocal = std::log(model.lens.focal) + std::clamp(step[at.focal], -0.2, 0.2);
+    moved.lens = lensOf(logFocal, std::clamp(cornerOf(model) + step[at.corner], -0.25, 0.25));
+    if (s.fixFocal) moved.lens.focal = model.lens.focal;
+    if (s.fixDistortion) moved.lens.k1 = model.lens.k1;
+    return moved;
+}
+
 }  // namespace
 
+// Levenberg and Marquardt: a step that makes it worse is tried again with more damping.
 double adjust(TurnModel& model, const std::vector<Pair>& pairs, const AdjustSettings& s) {
-    // Where each picture's unknowns begin; the first known one has none.
-    const std::size_t count = model.known.size();
-    std::vector<std::size_t> at(count, SIZE_MAX);
-    std::size_t unknowns = 0;
-    bool first = true;
-    for (std::size_t k = 0; k < count; ++k) {
-        if (!model.known[k]) continue;
-        if (!first) {
-            at[k] = unknowns;
-            unknowns += 3;
-        }
-        first = false;
-    }
-    const std::size_t focalAt = unknowns++, cornerAt = unknowns++;
-    std::vector<std::size_t> stretchAt(count, SIZE_MAX);
-    if (s.ownFocals) {
-        model.stretch.resize(count, 0.0);
-        for (std::size_t k = 0; k < count; ++k)
-            if (model.known[k]) stretchAt[k] = unknowns++;
-    }
+    const Unknowns at(model, s);
+    if (s.ownFocals) model.stretch.resize(model.known.size(), 0.0);
     double damping = 1e-4;
     double cost = costOf(model, pairs, s);
     for (int iteration = 0; iteration < s.iterations; ++iteration) {
-        const auto blocks = blocksOf(model, pairs, s, true);
-        std::vector<double> matrix(unknowns * unknowns, 0.0), right(unknowns, 0.0);
-        for (std::size_t p = 0; p < pairs.size(); ++p) {
-            std::array<std::size_t, kOwn> index{};
-            for (std::size_t i = 0; i < 3; ++i) {
-                const auto a = at[static_cast<std::size_t>(pairs[p].a)];
-                const auto b = at[static_cast<std::size_t>(pairs[p].b)];
-                index[i] = a == SIZE_MAX ? SIZE_MAX : a + i;
-                index[3 + i] = b == SIZE_MAX ? SIZE_MAX : b + i;
-            }
-            index[6] = s.fixFocal ? SIZE_MAX : focalAt;
-            index[7] = s.fixDistortion ? SIZE_MAX : cornerAt;
-            index[8] = stretchAt[static_cast<std::size_t>(pairs[p].a)];
-            index[9] = stretchAt[static_cast<std::size_t>(pairs[p].b)];
-            for (std::size_t i = 0; i < kOwn; ++i) {
-                if (index[i] == SIZE_MAX) continue;
-                right[index[i]] += blocks[p].right[i];
-                for (std::size_t j = 0; j < kOwn; ++j)
-                    if (index[j] != SIZE_MAX)
-                        matrix[index[i] * unknowns + index[j]] += blocks[p].matrix[i * kOwn + j];
-            }
-        }
-        const double corner = model.lens.k1 / (model.lens.focal * model.lens.focal);
-        const double noise = s.noisePixels * s.noisePixels;
-        const double f = noise / (s.focalSpread * s.focalSpread);
-        const double k = noise / (kDistortionSpread * kDistortionSpread);
-        matrix[focalAt * unknowns + focalAt] += f;
-        right[focalAt] -= s.fixFocal ? 0 : f * std::log(model.lens.focal / s.expectedFocal);
-        matrix[cornerAt * unknowns + cornerAt] += k;
-        right[cornerAt] -= s.fixDistortion ? 0 : k * corner;
-
-        const double t = noise / (kStretchSpread * kStretchSpread);
-        for (std::size_t c = 0; c < count; ++c) {
-            const std::size_t i = stretchAt[c];
-            if (i == SIZE_MAX) continue;
-            matrix[i * unknowns + i] += t;
-            right[i] -= t * model.stretch[c];
-        }
-
+        const Equations equations = equationsOf(model, pairs, s, at);
         bool better = false;
         double gain = 0;
         for (int tries = 0; tries < 8 && !better; ++tries) {
-            auto damped = matrix;
-            auto step = right;
-            for (std::size_t i = 0; i < unknowns; ++i)
-                damped[i * unknowns + i] += damping * matrix[i * unknowns + i] + 1e-9;
+            auto [damped, step] = equations;
+            for (std::size_t i = 0; i < at.count; ++i)
+                damped[i * at.count + i] += damping * equations.matrix[i * at.count + i] + 1e-9;
             if (solveSymmetric(damped, step)) {
-                TurnModel moved = model;
-                for (std::size_t c = 0; c < count; ++c)
-                    if (at[c] != SIZE_MAX)
-                        moved.worldFromCamera[c] =
-                            glm::normalize(quatOf({step[at[c]], step[at[c] + 1], step[at[c] + 2]}) *
-                                           moved.worldFromCamera[c]);
-                for (std::size_t c = 0; c < count; ++c)
-                    if (stretchAt[c] != SIZE_MAX)
-                        moved.stretch[c] =
-                            std::clamp(moved.stretch[c] + step[stretchAt[c]], -0.1, 0.1);
-                const double logFocal =
-                    std::log(model.lens.focal) + std::clamp(step[focalAt], -0.2, 0.2);
-                moved.lens = lensOf(logFocal, std::clamp(corner + step[cornerAt], -0.25, 0.25));
-                if (s.fixFocal) moved.lens.focal = model.lens.focal;
-                if (s.fixDistortion) moved.lens.k1 = model.lens.k1;
+                TurnModel moved = movedBy(model, step, at, s);
                 const double now = costOf(moved, pairs, s);
                 if (now < cost) {
                     gain = cost - now;

@@ -359,75 +359,84 @@ NodePtr bodyOf(const Node& instance, std::size_t& copied) {
 
 namespace {
 
-NodeIds nodeIdsOf(const std::vector<CommandFrame>& frames) {
-    NodeIds ids;
+/// What the commands of a scene say about its nodes and routes, in the order in which they come.
+struct Mentions {
     std::vector<const Node*> inOrder;
     std::unordered_map<const Node*, int> uses;
-    std::unordered_set<const Node*> named;  // by a route or as a target
-    // A node that replaces another under its name takes its id, too, so that later commands find
-    // it.
-    std::unordered_map<const Node*, const Node*> successors;
+    std::unordered_set<const Node*> named;  ///< by a route or as a target
+    /// A node that replaces another under its name takes its id, too, so that later commands find
+    /// it: the other by the one.
+    std::unordered_map<const Node*, const Node*> predecessors;
     std::vector<const Route*> routes;
-    const std::function<void(const NodePtr&)> visit = [&](const NodePtr& node) {
-        inOrder.push_back(node.get());
-        eachChild(*node, [&](const NodePtr& child) {
-            if (child) ++uses[child.get()];
-        });
-    };
-    Walk walk(visit);
-    for (const CommandFrame& frame : frames) {
-        for (const Command& command : frame.commands) {
-            eachRoot(command, [&](const NodePtr& root) { walk.from(root); });
-            std::visit(
-                [&](const auto& c) {
-                    if constexpr (requires { c.target; }) named.insert(c.target.get());
-                    if constexpr (requires { c.root; }) {
-                        if (c.root) ++uses[c.root.get()];
+
+    void add(const Command& command) {
+        std::visit(
+            [&](const auto& c) {
+                if constexpr (requires { c.target; }) named.insert(c.target.get());
+                if constexpr (requires { c.root; }) {
+                    use(c.root);
+                    if (c.root)
                         for (const Route& r : c.routes) routes.push_back(&r);
-                    }
-                    if constexpr (requires { c.route; }) routes.push_back(&c.route);
-                    if constexpr (requires { c.replacement; })
-                        if (c.replacement) {
-                            ++uses[c.replacement.get()];
-                            if (c.target && c.target != c.replacement &&
-                                !c.target->defName.empty() &&
-                                c.target->defName == c.replacement->defName)
-                                successors[c.replacement.get()] = c.target.get();
-                        }
-                    if constexpr (requires { c.node; })
-                        if (c.node) ++uses[c.node.get()];
-                    if constexpr (requires { c.value; })
-                        eachChild(c.value, [&](const NodePtr& n) {
-                            if (n) ++uses[n.get()];
-                        });
-                },
-                command);
-        }
-    }
-    std::unordered_set<std::uint32_t> takenRoutes;
-    for (const Route* route : routes) {
-        named.insert(route->from.get());
-        named.insert(route->to.get());
-        if (route->id != 0) takenRoutes.insert(route->id);
-        if (route->id != 0 && !route->name.empty())
-            ids.routesByName.emplace(route->name, route->id);
-        ids.highestRoute = std::max(ids.highestRoute, route->id);
+                }
+                if constexpr (requires { c.route; }) routes.push_back(&c.route);
+                if constexpr (requires { c.replacement; }) {
+                    use(c.replacement);
+                    if (c.replacement && c.target && c.target != c.replacement &&
+                        !c.target->defName.empty() && c.target->defName == c.replacement->defName)
+                        predecessors[c.replacement.get()] = c.target.get();
+                }
+                if constexpr (requires { c.node; }) use(c.node);
+                if constexpr (requires { c.value; })
+                    eachChild(c.value, [&](const NodePtr& n) { use(n); });
+            },
+            command);
     }
 
+    void use(const NodePtr& node) {
+        if (node) ++uses[node.get()];
+    }
+
+    [[nodiscard]] bool needsId(const Node* node) const {
+        const auto used = uses.find(node);
+        return !node->defName.empty() || (used != uses.end() && used->second > 1) ||
+               named.contains(node);
+    }
+};
+
+Mentions mentionsOf(const std::vector<CommandFrame>& frames) {
+    Mentions m;
+    const std::function<void(const NodePtr&)> visit = [&](const NodePtr& node) {
+        m.inOrder.push_back(node.get());
+        eachChild(*node, [&](const NodePtr& child) { m.use(child); });
+    };
+    Walk walk(visit);
+    for (const CommandFrame& frame : frames)
+        for (const Command& command : frame.commands) {
+            eachRoot(command, [&](const NodePtr& root) { walk.from(root); });
+            m.add(command);
+        }
+    for (const Route* route : m.routes) {
+        m.named.insert(route->from.get());
+        m.named.insert(route->to.get());
+    }
+    return m;
+}
+
+/// Ids that nodes have already stay; others take the lowest that are free.
+void numberNodes(const Mentions& m, NodeIds& ids) {
     std::unordered_set<std::uint32_t> taken;
-    for (const Node* node : inOrder)
+    for (const Node* node : m.inOrder)
         if (node->defId != 0) {
             taken.insert(node->defId);
             ids.nodes.emplace(node, node->defId);
         }
     std::uint32_t next = 1;
-    for (const Node* node : inOrder) {
-        if (node->defId != 0 || (node->defName.empty() && uses[node] < 2 && !named.contains(node)))
-            continue;
+    for (const Node* node : m.inOrder) {
+        if (node->defId != 0 || !m.needsId(node)) continue;
         // Targets are walked before what replaces them.
-        const auto before = successors.find(node);
+        const auto before = m.predecessors.find(node);
         const auto known =
-            before == successors.end() ? ids.nodes.end() : ids.nodes.find(before->second);
+            before == m.predecessors.end() ? ids.nodes.end() : ids.nodes.find(before->second);
         if (known != ids.nodes.end()) {
             ids.nodes.emplace(node, known->second);
             continue;
@@ -436,15 +445,32 @@ NodeIds nodeIdsOf(const std::vector<CommandFrame>& frames) {
         ids.nodes.emplace(node, next++);
     }
     for (const auto& [node, id] : ids.nodes) ids.highestNode = std::max(ids.highestNode, id);
+}
 
-    std::uint32_t nextRoute = 1;
+/// The same for routes with names.
+void numberRoutes(const std::vector<const Route*>& routes, NodeIds& ids) {
+    std::unordered_set<std::uint32_t> taken;
+    for (const Route* route : routes) {
+        if (route->id == 0) continue;
+        taken.insert(route->id);
+        if (!route->name.empty()) ids.routesByName.emplace(route->name, route->id);
+        ids.highestRoute = std::max(ids.highestRoute, route->id);
+    }
+    std::uint32_t next = 1;
     for (const Route* route : routes) {
         if (route->id != 0 || route->name.empty() || ids.routesByName.contains(route->name))
             continue;
-        while (takenRoutes.contains(nextRoute)) ++nextRoute;
-        ids.highestRoute = std::max(ids.highestRoute, nextRoute);
-        ids.routesByName.emplace(route->name, nextRoute++);
+        while (taken.contains(next)) ++next;
+        ids.highestRoute = std::max(ids.highestRoute, next);
+        ids.routesByName.emplace(route->name, next++);
     }
+}
+
+NodeIds nodeIdsOf(const std::vector<CommandFrame>& frames) {
+    const Mentions m = mentionsOf(frames);
+    NodeIds ids;
+    numberNodes(m, ids);
+    numberRoutes(m.routes, ids);
     return ids;
 }
 

@@ -233,19 +233,7 @@ class XmtReader : private TextReader {
 
     Result<void> readCommand(xml_node node, std::string_view type, std::uint64_t time) {
         const auto children = elements(node);
-        if (!node.attribute("atRoute").empty()) {
-            STX_TRY(const auto id, routeId(node.attribute("atRoute").value(), where(node)));
-            if (type == "Delete") {
-                addCommand(document_.frames, time, DeleteRoute{id});
-                return {};
-            }
-            if (type != "Replace" || children.size() != 1 || localName(children[0]) != "ROUTE")
-                return failAt(where(node), ErrorCode::invalidInput,
-                              "expected one <ROUTE> in <Replace atRoute>");
-            STX_TRY(auto route, readRoute(children[0]));
-            addCommand(document_.frames, time, ReplaceRoute{id, std::move(route)});
-            return {};
-        }
+        if (!node.attribute("atRoute").empty()) return readRouteCommand(node, type, time);
         if (!children.empty() && localName(children[0]) == "Scene" && type == "Replace")
             return readScene(children[0], time);
         if (!children.empty() && localName(children[0]) == "ROUTE" && type == "Insert") {
@@ -268,49 +256,42 @@ class XmtReader : private TextReader {
         if (const auto attribute = node.attribute("position"); !attribute.empty()) {
             STX_TRY(position, positionOf(node, attribute.value()));
         }
-        if (position && field >= 0 && !isMultiple(target->info->fields[field].type))
-            return failAt(where(node), ErrorCode::invalidInput,
-                          "{}.{} has one value, and so no position", target->info->name,
-                          target->info->fields[field].name);
+        if (field >= 0) return readFieldCommand(node, type, time, target, field, position);
+        if (type == "Insert") return insertNode(node, time, target, position);
+        if (type == "Replace") return replaceNode(node, time, target);
+        addCommand(document_.frames, time, DeleteNode{target});
+        return {};
+    }
+
+    /// <Delete atRoute> and <Replace atRoute>.
+    Result<void> readRouteCommand(xml_node node, std::string_view type, std::uint64_t time) {
+        STX_TRY(const auto id, routeId(node.attribute("atRoute").value(), where(node)));
         if (type == "Delete") {
-            if (field < 0) {
-                addCommand(document_.frames, time, DeleteNode{target});
-            } else if (position) {
-                addCommand(document_.frames, time, DeleteIndexed{target, field, *position});
-            } else {
+            addCommand(document_.frames, time, DeleteRoute{id});
+            return {};
+        }
+        const auto children = elements(node);
+        if (type != "Replace" || children.size() != 1 || localName(children[0]) != "ROUTE")
+            return failAt(where(node), ErrorCode::invalidInput,
+                          "expected one <ROUTE> in <Replace atRoute>");
+        STX_TRY(auto route, readRoute(children[0]));
+        addCommand(document_.frames, time, ReplaceRoute{id, std::move(route)});
+        return {};
+    }
+
+    /// A command with atField, and with a position where one item of the field is meant.
+    Result<void> readFieldCommand(xml_node node, std::string_view type, std::uint64_t time,
+                                  const NodePtr& target, int field,
+                                  std::optional<Position> position) {
+        const auto& info = target->info->fields[field];
+        if (position && !isMultiple(info.type))
+            return failAt(where(node), ErrorCode::invalidInput,
+                          "{}.{} has one value, and so no position", target->info->name, info.name);
+        if (type == "Delete") {
+            if (!position)
                 return failAt(where(node), ErrorCode::invalidInput,
                               "<Delete atField> needs a position; a whole field cannot be deleted");
-            }
-            return {};
-        }
-        if (type == "Insert" && field < 0) {
-            const int childrenField = target->info->find("children");
-            if (childrenField < 0 || children.size() != 1)
-                return failAt(
-                    where(node), ErrorCode::invalidInput,
-                    "<Insert> puts one node into the children of a grouping node; {} is not "
-                    "one, or there is not one node",
-                    target->info->name);
-            int height = 0;
-            STX_TRY(auto child, readNode(children[0], 1, height, nullptr, -1, -1));
-            STX_CHECK(checkNodePlace(child.get(), target->info->fields[childrenField].nodeType,
-                                     target->info->name, "children", where(children[0])));
-            addCommand(document_.frames, time,
-                       InsertNode{target, position.value_or(Position()), std::move(child)});
-            return {};
-        }
-        if (field < 0) {
-            if (children.size() > 1)
-                return failAt(where(node), ErrorCode::invalidInput,
-                              "<Replace atNode> takes one node");
-            NodePtr replacement;
-            int height = 0;
-            if (!children.empty()) {
-                const std::size_t named = names_.named().size();
-                STX_TRY(replacement, readNode(children[0], 1, height, nullptr, -1, -1));
-                names_.succeed(*target, replacement, named);
-            }
-            addCommand(document_.frames, time, ReplaceNode{target, std::move(replacement)});
+            addCommand(document_.frames, time, DeleteIndexed{target, field, *position});
             return {};
         }
         if (type == "Insert" && !position) position = Position();
@@ -324,6 +305,39 @@ class XmtReader : private TextReader {
         } else {
             addCommand(document_.frames, time, ReplaceField{target, field, std::move(value)});
         }
+        return {};
+    }
+
+    Result<void> insertNode(xml_node node, std::uint64_t time, const NodePtr& target,
+                            std::optional<Position> position) {
+        const auto children = elements(node);
+        const int childrenField = target->info->find("children");
+        if (childrenField < 0 || children.size() != 1)
+            return failAt(where(node), ErrorCode::invalidInput,
+                          "<Insert> puts one node into the children of a grouping node; {} is not "
+                          "one, or there is not one node",
+                          target->info->name);
+        int height = 0;
+        STX_TRY(auto child, readNode(children[0], 1, height, nullptr, -1, -1));
+        STX_CHECK(checkNodePlace(child.get(), target->info->fields[childrenField].nodeType,
+                                 target->info->name, "children", where(children[0])));
+        addCommand(document_.frames, time,
+                   InsertNode{target, position.value_or(Position()), std::move(child)});
+        return {};
+    }
+
+    Result<void> replaceNode(xml_node node, std::uint64_t time, const NodePtr& target) {
+        const auto children = elements(node);
+        if (children.size() > 1)
+            return failAt(where(node), ErrorCode::invalidInput, "<Replace atNode> takes one node");
+        NodePtr replacement;
+        int height = 0;
+        if (!children.empty()) {
+            const std::size_t named = names_.named().size();
+            STX_TRY(replacement, readNode(children[0], 1, height, nullptr, -1, -1));
+            names_.succeed(*target, replacement, named);
+        }
+        addCommand(document_.frames, time, ReplaceNode{target, std::move(replacement)});
         return {};
     }
 

@@ -66,20 +66,33 @@ struct SampleFuser {
             d, hn::Ne(hn::And(hn::BitCast(du, q), hn::Set(du, flags)), hn::Zero(du)));
     }
 
-    /// rejected() of shaders/shared, for the points of `asked`: they are at depth `q` and are shown
-    /// by the source that `owner` is the index of among the sources of `pixel`.
-    HWY_INLINE PointMask rejected(Points q, Counts owner, PointMask asked) const {
+    /// What the samples of a pixel say about a point, before the other sources are asked.
+    struct Opinions {
+        Counts against, enough;    ///< votes; enough of them reject the point
+        std::uint32_t listed = 0;  ///< the sources that have samples here
+        /// Lanes in which a source does not show the point: it shows another surface there, or
+        /// none.
+        std::uint32_t others[kMostTileSources];
+        /// Lanes in which a sample of a source lies closely behind the point, which may give way
+        /// to it: nothing but extensions shows the point.
+        std::uint32_t closelyBehind[kMostTileSources] = {};
+        bool mayGiveWay = false;
+    };
+
+    /// A lane's number for each point.
+    static HWY_INLINE PointMask isOwner(Counts owner, int i) {
+        return hn::RebindMask(PointTag(), hn::Eq(owner, hn::Set(CountTag(), i)));
+    }
+
+    /// Which points of `nearEdge` are background that their own source shows beside an edge.
+    /// `silhouette` gets those that the source shows with less than solid alpha.
+    HWY_INLINE PointMask backgroundAtEdges(const FramePoints& points, Counts owner,
+                                           PointMask nearEdge, PointMask& silhouette) const {
         const PointTag d;
-        const CountTag di;
-        const FramePoints points{x, y, q};
-        const auto asCounts = [&](PointMask mask) HWY_ATTR { return hn::RebindMask(di, mask); };
-        const auto isOwner = [&](int i) HWY_ATTR {
-            return hn::RebindMask(d, hn::Eq(owner, hn::Set(di, i)));
-        };
-        const PointMask nearEdge = hn::And(asked, flagged(q, kNearEdgeBit));
-        PointMask out = hn::Lt(q, hn::Zero(d)), silhouette = out;  // none
+        PointMask out = hn::Lt(points.q, hn::Zero(d));  // none
+        silhouette = out;
         for (int i = 0; i < pixel.count && !hn::AllFalse(d, nearEdge); ++i) {
-            const PointMask mine = hn::And(nearEdge, isOwner(i));
+            const PointMask mine = hn::And(nearEdge, isOwner(owner, i));
             const int s = pixel.owner[i];
             if (!votes.hasAlpha(s) || hn::AllFalse(d, mine)) continue;
             const SourcePoints p(votes.locals[static_cast<std::size_t>(s)], points, true);
@@ -100,101 +113,125 @@ struct SampleFuser {
             out = hn::Or(out, areBackground(votes, from, s, p, level, mine));
             silhouette = hn::Or(silhouette, hn::And(mine, hn::Lt(level, hn::Set(d, kSolidAlpha))));
         }
-        asked = hn::AndNot(out, asked);
-        if (hn::AllFalse(d, asked)) return out;
+        return out;
+    }
 
-        using shared::Votes;
-        alignas(64) std::int32_t owners[kMostPoints] = {};  // by number in the tile
-        hn::Store(owner, di, owners);
-        for (std::int32_t& k : owners) k = pixel.owner[k];
-        Facets facets;
-        facets.owners = owners;
-        const Points within = sameWithin(q);
-        const Counts whole = hn::Set(di, Votes::kWholeVote);
-        Counts against = hn::Zero(di);
-        Counts enough =
-            hn::IfThenElse(asCounts(nearEdge), hn::Set(di, Votes::kWholeVote * kVotesNearEdge),
-                           hn::Set(di, Votes::kWholeVote * kVotesElsewhere));
-        // Lanes in which a source does not show the point: it shows another surface there, or none.
-        std::uint32_t others[kMostTileSources];
-        std::uint32_t listed = 0;
-        std::uint32_t closelyBehind[kMostTileSources] = {};
+    HWY_INLINE void hearSamples(const FramePoints& points, Counts owner, PointMask asked,
+                                PointMask silhouette, Facets& facets, Opinions& o) const {
+        const PointTag d;
+        const CountTag di;
+        const Points q = points.q, within = sameWithin(q);
+        const Counts whole = hn::Set(di, shared::Votes::kWholeVote);
         PointMask guess = hn::And(asked, flagged(q, kExtensionBit));
         const Points close =
             hn::Mul(hn::Set(d, kLinkedSamples), tile.axis.inverse ? q : hn::Set(d, 1.0f));
         const Points farthest = hn::Max(hn::Sub(q, close), hn::Zero(d));
-        std::uint32_t mayGiveWay =
-            0;  // lanes in which another sample lies closely behind the point
         for (int i = 0; i < pixel.count; ++i) {
             const int k = pixel.owner[i];
-            listed |= 1u << k;
+            o.listed |= 1u << k;
             const Points value = sampleOf(i);
-            const PointMask theirs = hn::AndNot(isOwner(i), asked);
+            const PointMask theirs = hn::AndNot(isOwner(owner, i), asked);
             const PointMask same = hn::And(hn::And(theirs, hn::Gt(value, hn::Zero(d))),
                                            hn::Lt(hn::Abs(hn::Sub(value, q)), within));
             const PointMask apart = hn::AndNot(same, theirs);
-            others[k] = lanesOf(apart);
+            o.others[k] = lanesOf(apart);
             const PointMask near =
                 hn::And(hn::And(apart, guess), hn::And(hn::Lt(value, q), hn::Gt(value, farthest)));
-            if (!hn::AllFalse(d, near)) {
-                closelyBehind[k] = lanesOf(hn::AndNot(flagged(value, kExtensionBit), near));
-                mayGiveWay |= closelyBehind[k];
-            }
+            if (!hn::AllFalse(d, near))
+                o.closelyBehind[k] = lanesOf(hn::AndNot(flagged(value, kExtensionBit), near));
             const PointMask extension = hn::And(same, flagged(value, kExtensionBit));
             PointMask supports = hn::AndNot(extension, same);
             guess = hn::AndNot(supports, guess);
             if (!hn::AllFalse(d, extension)) {
                 const Counts vote =
                     votesOf(votes, VotingSource(votes.at(k)), k, points, facets, extension);
-                against = hn::Add(against, vote);
+                o.against = hn::Add(o.against, vote);
                 const PointMask none = hn::RebindMask(d, hn::Eq(vote, hn::Zero(di)));
                 supports = hn::Or(supports, hn::And(hn::And(extension, silhouette), none));
             }
-            enough = hn::Add(enough, hn::IfThenElseZero(asCounts(supports), whole));
+            o.enough = hn::Add(o.enough, hn::IfThenElseZero(hn::RebindMask(di, supports), whole));
         }
-        // The most votes against the point that sources not asked yet could still give.
+        const std::uint32_t guesses = lanesOf(guess);
+        for (int i = 0; i < pixel.count; ++i) {
+            o.closelyBehind[pixel.owner[i]] &= guesses;
+            o.mayGiveWay = o.mayGiveWay || o.closelyBehind[pixel.owner[i]] != 0;
+        }
+    }
+
+    /// Which points of `asked` are rejected, or replaced by a sample closely behind, when the
+    /// sources are asked that do not show them.
+    HWY_INLINE PointMask askSources(const FramePoints& points, PointMask asked, Facets& facets,
+                                    Opinions& o) const {
+        const PointTag d;
+        const CountTag di;
         const int count = static_cast<int>(tile.sources.size());
+        // The most votes against the point that sources not asked yet could still give.
         const Counts each = hn::Set(di, mostOfOne);
         Counts most = hn::Set(di, mostOfOne * (count - pixel.count));
-        for (int i = 0; i < pixel.count; ++i)
-            most =
-                hn::Add(most, hn::IfThenElseZero(asCounts(maskOf(others[pixel.owner[i]])), each));
+        for (int i = 0; i < pixel.count; ++i) {
+            const PointMask other = maskOf(o.others[pixel.owner[i]]);
+            most = hn::Add(most, hn::IfThenElseZero(hn::RebindMask(di, other), each));
+        }
         std::uint32_t open = lanesOf(asked);
         std::uint32_t replaced = 0, waits[kMostTileSources + 1] = {};
-        mayGiveWay &= lanesOf(guess);
-        for (int k = count - 1; k >= 0 && mayGiveWay; --k) {
-            closelyBehind[k] &= mayGiveWay;
-            waits[k] = waits[k + 1] | closelyBehind[k];
-        }
+        for (int k = count - 1; k >= 0 && o.mayGiveWay; --k)
+            waits[k] = waits[k + 1] | o.closelyBehind[k];
         for (int k = 0; k < count; ++k) {
             // A point with enough votes against it is rejected and asks no more. So does a point
             // that cannot get enough any more, unless a sample closely behind may still replace it.
-            open &=
-                lanesOf(hn::RebindMask(d, hn::Gt(enough, against))) &
-                (~lanesOf(hn::RebindMask(d, hn::Gt(enough, hn::Add(against, most)))) | waits[k]);
+            open &= lanesOf(hn::RebindMask(d, hn::Gt(o.enough, o.against))) &
+                    (~lanesOf(hn::RebindMask(d, hn::Gt(o.enough, hn::Add(o.against, most)))) |
+                     waits[k]);
             if (!open) break;
-            const bool lists = listed >> k & 1u;
-            const PointMask other = lists ? maskOf(others[k]) : asked;
-            most = hn::Sub(most, hn::IfThenElseZero(asCounts(other), each));
-            const std::uint32_t asks = lists ? others[k] & open : open;
+            const bool lists = o.listed >> k & 1u;
+            const PointMask other = lists ? maskOf(o.others[k]) : asked;
+            most = hn::Sub(most, hn::IfThenElseZero(hn::RebindMask(di, other), each));
+            const std::uint32_t asks = lists ? o.others[k] & open : open;
             if (!asks) continue;
             const Counts vote =
                 votesOf(votes, VotingSource(votes.at(k)), k, points, facets, maskOf(asks));
-            against = hn::Add(against, vote);
+            o.against = hn::Add(o.against, vote);
             const std::uint32_t maybe =
-                asks & closelyBehind[k] & lanesOf(hn::RebindMask(d, hn::Eq(vote, hn::Zero(di))));
+                asks & o.closelyBehind[k] & lanesOf(hn::RebindMask(d, hn::Eq(vote, hn::Zero(di))));
             if (!maybe) continue;
             const auto seesBetter = [&](int l, float px, float py, float pq) {
                 const auto& facet = facets.at(votes, l, px, py, pq);
                 return facet.any && votes.sizeIn(k, facet, votes.warp(k, px, py, pq)) > kSeesBetter;
             };
-            replaced |= lanesOf(hn::RebindMask(
-                d,
-                hn::Gt(withVotes(hn::Zero(di), x, y, q, maskOf(maybe), seesBetter), hn::Zero(di))));
+            const Counts better =
+                withVotes(hn::Zero(di), points.x, points.y, points.q, maskOf(maybe), seesBetter);
+            replaced |= lanesOf(hn::RebindMask(d, hn::Gt(better, hn::Zero(di))));
             open &= ~replaced;
         }
-        const PointMask few = hn::RebindMask(d, hn::Gt(enough, against));
-        return hn::Or(hn::Or(out, maskOf(replaced)), hn::AndNot(few, asked));
+        const PointMask few = hn::RebindMask(d, hn::Gt(o.enough, o.against));
+        return hn::Or(maskOf(replaced), hn::AndNot(few, asked));
+    }
+
+    /// rejected() of shaders/shared, for the points of `asked`: they are at depth `q` and are shown
+    /// by the source that `owner` is the index of among the sources of `pixel`.
+    HWY_INLINE PointMask rejected(Points q, Counts owner, PointMask asked) const {
+        using shared::Votes;
+        const PointTag d;
+        const CountTag di;
+        const FramePoints points{x, y, q};
+        const PointMask nearEdge = hn::And(asked, flagged(q, kNearEdgeBit));
+        PointMask silhouette;
+        const PointMask out = backgroundAtEdges(points, owner, nearEdge, silhouette);
+        asked = hn::AndNot(out, asked);
+        if (hn::AllFalse(d, asked)) return out;
+
+        alignas(64) std::int32_t owners[kMostPoints] = {};  // by number in the tile
+        hn::Store(owner, di, owners);
+        for (std::int32_t& k : owners) k = pixel.owner[k];
+        Facets facets;
+        facets.owners = owners;
+        Opinions opinions;
+        opinions.against = hn::Zero(di);
+        opinions.enough = hn::IfThenElse(hn::RebindMask(di, nearEdge),
+                                         hn::Set(di, Votes::kWholeVote * kVotesNearEdge),
+                                         hn::Set(di, Votes::kWholeVote * kVotesElsewhere));
+        hearSamples(points, owner, asked, silhouette, facets, opinions);
+        return hn::Or(out, askSources(points, asked, facets, opinions));
     }
 
     /// agreed() of the shared code.

@@ -98,8 +98,17 @@ struct Polygons {
     Bits flags;
 };
 
-/// What filling them needs, of lane l: the plane p0 + px x + py y within low..high, what is inside
-/// of edge i where e0[i] + ex[i] x + ey[i] y is not below 0, and their samples.
+/// What filling them needs: the samples x0..x1, y0..y1 of each, the plane p0 + px x + py y within
+/// low..high, and edges: inside of edge i is where e0[i] + ex[i] x + ey[i] y is not below 0.
+struct Planes {
+    Floats x0, y0, x1, y1;
+    Floats px, py, p0, low, high;
+    Floats ex[4], ey[4], e0[4];
+    Floats behind;  ///< with kExtend: samples below it may be covered
+    Bits flags;
+};
+
+/// Planes of which each lane can be asked.
 struct Filling {
     alignas(64) float x0[kLanes], y0[kLanes], x1[kLanes], y1[kLanes];
     alignas(64) float px[kLanes], py[kLanes], p0[kLanes], low[kLanes], high[kLanes];
@@ -150,121 +159,160 @@ HWY_INLINE void fillPolygon(const Target& t, const Filling& f, int l) {
     }
 }
 
+HWY_INLINE Floats leastOf(const Floats* v) {
+    return hn::Min(hn::Min(v[0], v[1]), hn::Min(v[2], v[3]));
+}
+HWY_INLINE Floats mostOf(const Floats* v) {
+    return hn::Max(hn::Max(v[0], v[1]), hn::Max(v[2], v[3]));
+}
+HWY_INLINE Floats totalOf(const Floats* v) {
+    return hn::Add(hn::Add(v[0], v[1]), hn::Add(v[2], v[3]));
+}
+
+/// The diagonals of a polygon, which span its plane.
+struct Diagonals {
+    Floats ax, ay, aq, bx, by, bq;
+
+    explicit HWY_INLINE Diagonals(const Polygons& p)
+        : ax(hn::Sub(p.x[2], p.x[0])),
+          ay(hn::Sub(p.y[2], p.y[0])),
+          aq(hn::Sub(p.q[2], p.q[0])),
+          bx(hn::Sub(p.x[3], p.x[1])),
+          by(hn::Sub(p.y[3], p.y[1])),
+          bq(hn::Sub(p.q[3], p.q[1])) {}
+    /// Twice the area, above 0 where the corners turn the right way.
+    [[nodiscard]] HWY_INLINE Floats area() const {
+        return hn::Sub(hn::Mul(ax, by), hn::Mul(ay, bx));
+    }
+};
+
+/// Planes and edges. x0..y1, low and high are there already.
+HWY_INLINE void addPlanes(const Target& t, const Polygons& p, const Diagonals& g, Floats area,
+                          bool extend, Planes& out) {
+    const FloatTag d;
+    const BitTag du;
+    const Floats inverseArea = hn::Div(hn::Set(d, 1.0f), area);
+    out.px = hn::Mul(hn::Sub(hn::Mul(g.aq, g.by), hn::Mul(g.ay, g.bq)), inverseArea);
+    out.py = hn::Mul(hn::Sub(hn::Mul(g.ax, g.bq), hn::Mul(g.aq, g.bx)), inverseArea);
+    out.p0 = hn::Mul(
+        hn::Set(d, 0.25f),
+        hn::NegMulAdd(out.px, totalOf(p.x), hn::NegMulAdd(out.py, totalOf(p.y), totalOf(p.q))));
+    for (int i = 0; i < 4; ++i) {
+        const int next = (i + 1) % 4;
+        out.ex[i] = hn::Sub(p.y[i], p.y[next]);
+        out.ey[i] = hn::Sub(p.x[next], p.x[i]);
+        const Floats from = hn::MulAdd(out.ex[i], p.x[i], hn::Mul(out.ey[i], p.y[i]));
+        out.e0[i] = hn::MulSub(p.grow, hn::Add(hn::Abs(out.ex[i]), hn::Abs(out.ey[i])), from);
+    }
+    out.flags = hn::And(p.flags, hn::Set(du, std::uint32_t{kSampleFlags}));
+    out.behind = hn::Zero(d);
+    if (extend) {
+        const auto covers = hn::RebindMask(
+            d, hn::Ne(hn::And(p.flags, hn::Set(du, std::uint32_t{kCoversBit})), hn::Zero(du)));
+        const Floats apart = hn::Set(d, kLinkedSamples);
+        out.behind = hn::IfThenElseZero(
+            covers, hn::Sub(out.low, t.inverse ? hn::Mul(apart, out.low) : apart));
+    }
+}
+
+/// Draws polygons of up to 2x2 samples: each of them in all polygons at once.
+template <bool kExtend>
+HWY_INLINE void drawSmall(const Target& t, const Planes& f, FloatMask small) {
+    const FloatTag d;
+    const BitTag du;
+    const hn::RebindToSigned<FloatTag> di;
+    const Floats zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+    alignas(64) float values[kLanes], behind[kLanes];
+    alignas(64) std::int32_t places[kLanes];
+    hn::Store(f.behind, d, behind);
+    const Floats clean = hn::BitCast(d, hn::Set(du, ~std::uint32_t{kSampleFlags}));
+    for (int k = 0; k < 4; ++k) {
+        const Floats x = k & 1 ? hn::Add(f.x0, one) : f.x0, y = k & 2 ? hn::Add(f.y0, one) : f.y0;
+        FloatMask here = hn::And(small, hn::And(hn::Le(x, f.x1), hn::Le(y, f.y1)));
+        for (int i = 0; i < 4; ++i) {
+            const Floats inside = hn::MulAdd(f.ex[i], x, hn::MulAdd(f.ey[i], y, f.e0[i]));
+            here = hn::And(here, hn::Ge(inside, zero));
+        }
+        std::uint32_t left = bitsOf(here);
+        if (!left) continue;
+        Floats q = hn::MulAdd(f.px, x, hn::MulAdd(f.py, y, f.p0));
+        q = hn::Min(hn::Max(q, f.low), f.high);
+        hn::Store(hn::Or(hn::And(q, clean), hn::BitCast(d, f.flags)), d, values);
+        const auto place = hn::MulAdd(y, hn::Set(d, static_cast<float>(t.stride)), x);
+        hn::Store(hn::ConvertTo(di, place), di, places);
+        for (; left; left &= left - 1) {
+            const int l = std::countr_zero(left);
+            float& old = t.samples[places[l]];
+            if (kExtend && old != 0.0f && !(old < behind[l]) &&
+                !(std::bit_cast<std::uint32_t>(old) & kExtensionBit))
+                continue;
+            old = std::max(old, values[l]);
+        }
+    }
+}
+
+HWY_INLINE void storePlanes(const Planes& from, Filling& to) {
+    const FloatTag d;
+    hn::Store(from.behind, d, to.behind);
+    hn::Store(from.x0, d, to.x0);
+    hn::Store(from.y0, d, to.y0);
+    hn::Store(from.x1, d, to.x1);
+    hn::Store(from.y1, d, to.y1);
+    hn::Store(from.px, d, to.px);
+    hn::Store(from.py, d, to.py);
+    hn::Store(from.p0, d, to.p0);
+    hn::Store(from.low, d, to.low);
+    hn::Store(from.high, d, to.high);
+    for (int i = 0; i < 4; ++i) {
+        hn::Store(from.ex[i], d, to.ex[i]);
+        hn::Store(from.ey[i], d, to.ey[i]);
+        hn::Store(from.e0[i], d, to.e0[i]);
+    }
+    hn::Store(from.flags, BitTag(), to.flags);
+}
+
 /// Draws polygons. With kExtend only samples that no mesh holds are written, and with kCoversBit
 /// those of meshes behind.
 template <bool kExtend>
 HWY_INLINE void drawPolygons(Target& t, const Polygons& p, Extent& extent) {
     const FloatTag d;
-    const BitTag du;
     const Floats zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-    const auto least = [&](const Floats* v)
-                           HWY_ATTR { return hn::Min(hn::Min(v[0], v[1]), hn::Min(v[2], v[3])); };
-    const auto most = [&](const Floats* v)
-                          HWY_ATTR { return hn::Max(hn::Max(v[0], v[1]), hn::Max(v[2], v[3])); };
-    const auto total = [&](const Floats* v)
-                           HWY_ATTR { return hn::Add(hn::Add(v[0], v[1]), hn::Add(v[2], v[3])); };
-    const Floats low = least(p.q), high = most(p.q),
-                 last = hn::Set(d, static_cast<float>(t.side - 1));
-    const Floats fx0 = hn::Max(hn::Sub(least(p.x), p.grow), zero);
-    const Floats fy0 = hn::Max(hn::Sub(least(p.y), p.grow), zero);
-    const Floats fx1 = hn::Min(hn::Add(most(p.x), p.grow), last);
-    const Floats fy1 = hn::Min(hn::Add(most(p.y), p.grow), last);
-    // The diagonals span the plane; its z component is twice the signed area.
-    const Floats ax = hn::Sub(p.x[2], p.x[0]), ay = hn::Sub(p.y[2], p.y[0]),
-                 aq = hn::Sub(p.q[2], p.q[0]);
-    const Floats bx = hn::Sub(p.x[3], p.x[1]), by = hn::Sub(p.y[3], p.y[1]),
-                 bq = hn::Sub(p.q[3], p.q[1]);
-    const Floats area = hn::Sub(hn::Mul(ax, by), hn::Mul(ay, bx));
+    const Floats last = hn::Set(d, static_cast<float>(t.side - 1));
+    const Floats fx0 = hn::Max(hn::Sub(leastOf(p.x), p.grow), zero);
+    const Floats fy0 = hn::Max(hn::Sub(leastOf(p.y), p.grow), zero);
+    const Floats fx1 = hn::Min(hn::Add(mostOf(p.x), p.grow), last);
+    const Floats fy1 = hn::Min(hn::Add(mostOf(p.y), p.grow), last);
+    Planes f;
+    f.low = leastOf(p.q);
+    f.high = mostOf(p.q);
+    const Diagonals diagonals(p);
+    const Floats area = diagonals.area();
     FloatMask mask = hn::And(hn::And(p.there, hn::Gt(area, zero)),
-                             hn::And(hn::Gt(low, zero), hn::Le(high, hn::Set(d, t.qLimit))));
+                             hn::And(hn::Gt(f.low, zero), hn::Le(f.high, hn::Set(d, t.qLimit))));
     mask = hn::And(mask, hn::And(hn::Le(fx0, fx1), hn::Le(fy0, fy1)));
     if (hn::AllFalse(d, mask)) return;
     extent.add(mask, fx0, fy0, fx1, fy1);
-    const Floats x0 = hn::Ceil(fx0), y0 = hn::Ceil(fy0), x1 = hn::Floor(fx1), y1 = hn::Floor(fy1);
-    mask = hn::And(mask, hn::And(hn::Le(x0, x1), hn::Le(y0, y1)));
+    f.x0 = hn::Ceil(fx0);
+    f.y0 = hn::Ceil(fy0);
+    f.x1 = hn::Floor(fx1);
+    f.y1 = hn::Floor(fy1);
+    mask = hn::And(mask, hn::And(hn::Le(f.x0, f.x1), hn::Le(f.y0, f.y1)));
     if (hn::AllFalse(d, mask)) return;
     t.clear();
 
-    const Floats inverseArea = hn::Div(one, area);
-    const Floats px = hn::Mul(hn::Sub(hn::Mul(aq, by), hn::Mul(ay, bq)), inverseArea);
-    const Floats py = hn::Mul(hn::Sub(hn::Mul(ax, bq), hn::Mul(aq, bx)), inverseArea);
-    const Floats p0 =
-        hn::Mul(hn::Set(d, 0.25f),
-                hn::NegMulAdd(px, total(p.x), hn::NegMulAdd(py, total(p.y), total(p.q))));
-    Floats ex[4], ey[4], e0[4];
-    for (int i = 0; i < 4; ++i) {
-        const int next = (i + 1) % 4;
-        ex[i] = hn::Sub(p.y[i], p.y[next]);
-        ey[i] = hn::Sub(p.x[next], p.x[i]);
-        const Floats from = hn::MulAdd(ex[i], p.x[i], hn::Mul(ey[i], p.y[i]));
-        e0[i] = hn::MulSub(p.grow, hn::Add(hn::Abs(ex[i]), hn::Abs(ey[i])), from);
-    }
-
-    const Bits flags = hn::And(p.flags, hn::Set(du, std::uint32_t{kSampleFlags}));
-    Floats limit = zero;
-    if (kExtend) {
-        const auto covers = hn::RebindMask(
-            d, hn::Ne(hn::And(p.flags, hn::Set(du, std::uint32_t{kCoversBit})), hn::Zero(du)));
-        const Floats apart = hn::Set(d, kLinkedSamples);
-        limit = hn::IfThenElseZero(covers, hn::Sub(low, t.inverse ? hn::Mul(apart, low) : apart));
-    }
-
-    // Of up to 2x2 samples: each of them in all polygons at once.
+    addPlanes(t, p, diagonals, area, kExtend, f);
     const FloatMask small =
-        hn::And(mask, hn::And(hn::Le(hn::Sub(x1, x0), one), hn::Le(hn::Sub(y1, y0), one)));
-    if (!hn::AllFalse(d, small)) {
-        const hn::RebindToSigned<FloatTag> di;
-        alignas(64) float values[kLanes], behind[kLanes];
-        alignas(64) std::int32_t places[kLanes];
-        hn::Store(limit, d, behind);
-        const Floats clean = hn::BitCast(d, hn::Set(du, ~std::uint32_t{kSampleFlags}));
-        for (int k = 0; k < 4; ++k) {
-            const Floats x = k & 1 ? hn::Add(x0, one) : x0, y = k & 2 ? hn::Add(y0, one) : y0;
-            FloatMask here = hn::And(small, hn::And(hn::Le(x, x1), hn::Le(y, y1)));
-            for (int i = 0; i < 4; ++i)
-                here =
-                    hn::And(here, hn::Ge(hn::MulAdd(ex[i], x, hn::MulAdd(ey[i], y, e0[i])), zero));
-            std::uint32_t left = bitsOf(here);
-            if (!left) continue;
-            Floats q = hn::MulAdd(px, x, hn::MulAdd(py, y, p0));
-            q = hn::Min(hn::Max(q, low), high);
-            hn::Store(hn::Or(hn::And(q, clean), hn::BitCast(d, flags)), d, values);
-            const auto place = hn::MulAdd(y, hn::Set(d, static_cast<float>(t.stride)), x);
-            hn::Store(hn::ConvertTo(di, place), di, places);
-            for (; left; left &= left - 1) {
-                const int l = std::countr_zero(left);
-                float& old = t.samples[places[l]];
-                if (kExtend && old != 0.0f && !(old < behind[l]) &&
-                    !(std::bit_cast<std::uint32_t>(old) & kExtensionBit))
-                    continue;
-                old = std::max(old, values[l]);
-            }
-        }
-    }
+        hn::And(mask, hn::And(hn::Le(hn::Sub(f.x1, f.x0), one), hn::Le(hn::Sub(f.y1, f.y0), one)));
+    if (!hn::AllFalse(d, small)) drawSmall<kExtend>(t, f, small);
     std::uint32_t large = bitsOf(hn::AndNot(small, mask));
     if (!large) return;
-    Filling f;
-    hn::Store(limit, d, f.behind);
-    hn::Store(x0, d, f.x0);
-    hn::Store(y0, d, f.y0);
-    hn::Store(x1, d, f.x1);
-    hn::Store(y1, d, f.y1);
-    hn::Store(px, d, f.px);
-    hn::Store(py, d, f.py);
-    hn::Store(p0, d, f.p0);
-    hn::Store(low, d, f.low);
-    hn::Store(high, d, f.high);
-    for (int i = 0; i < 4; ++i) {
-        hn::Store(ex[i], d, f.ex[i]);
-        hn::Store(ey[i], d, f.ey[i]);
-        hn::Store(e0[i], d, f.e0[i]);
-    }
-    hn::Store(flags, du, f.flags);
+    Filling filling;
+    storePlanes(f, filling);
     for (; large; large &= large - 1) {
         const int l = std::countr_zero(large);
         if (t.squares == kAllSquares ||
-            (t.squares & t.squaresFrom(f.x0[l], f.y0[l], f.x1[l], f.y1[l])))
-            fillPolygon<kExtend>(t, f, l);
+            (t.squares & t.squaresFrom(filling.x0[l], filling.y0[l], filling.x1[l], filling.y1[l])))
+            fillPolygon<kExtend>(t, filling, l);
     }
 }
 
