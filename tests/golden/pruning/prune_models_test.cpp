@@ -16,8 +16,9 @@ namespace stx {
 namespace {
 
 /// Not one pixel of a model may open when its views are pruned, nor when they come out of an atlas:
-/// in both modes, on the processor and on whatever OpenGL there is.
-void expectNoHole(const std::filesystem::path& file) {
+/// in both modes, on the processor and, of one model, on whatever OpenGL there is: others take
+/// minutes on software drivers, and tests of the GPU say that it draws what the processor draws.
+void expectNoHole(const std::filesystem::path& file, bool onGpu = false) {
     constexpr int kSide = 256;
     Job job;
     auto opened = openRenderable(file.string(), {}, job);
@@ -50,6 +51,7 @@ void expectNoHole(const std::filesystem::path& file) {
         for (const RenderMode mode : {RenderMode::surface, RenderMode::splat}) {
             RenderSettings settings;
             settings.mode = mode;
+            if (backend == Backend::gpu && !onGpu) continue;
             const auto whole = makeRenderer(backend, *before, settings, -1, job);
             if (!whole && backend == Backend::gpu) continue;
             const auto pruned = makeRenderer(backend, after, settings, -1, job);
@@ -82,7 +84,7 @@ TEST(PruneModels, FoxStaysClosed) {
 
 TEST(PruneModels, TruckStaysClosed) {
     REQUIRE_SHARED(folder, "data/meshes/gltf/draco-repo/CesiumMilkTruck/glTF");
-    expectNoHole(folder / "CesiumMilkTruck.gltf");
+    expectNoHole(folder / "CesiumMilkTruck.gltf", true);
 }
 
 TEST(PruneModels, EngineStaysClosed) {
