@@ -137,7 +137,7 @@ Result<int> backgroundOfBundle(const BackgroundOptions& o, Program& program) {
     preloadCodecs(o.inputs[0]);
     OpenOptions open;
     open.set.strict = o.strict;
-    STX_TRY(auto frames, openSequence(o.inputs[0], open, program.job));
+    STX_TRY(auto frames, openSequence(o.inputs[0], open.into(o.output), program.job));
     if (!frames->timeline().moves())
         return failAt(fmt::format("'{}'", o.inputs[0]), ErrorCode::invalidInput,
                       "it has one frame; a background is found in what others uncover");

@@ -25,7 +25,7 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
     STX_CHECK(checkTarget(o.output, program));
     STX_TRY(const auto container, containerOf(o.output));
     preloadCodecs(o.input);
-    STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
+    STX_TRY(auto frames, openSequence(o.input, o.open.into(o.output), program.job));
     BakeSettings settings = o.settings;
     settings.method =
         o.method == "paper" ? BakeSettings::Method::paper : BakeSettings::Method::robust;

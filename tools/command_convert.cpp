@@ -367,7 +367,7 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
             command.refuse({"--point-texture", "--octree-image"}, "does not go with --video"));
     const auto container = containerOf(o.output);
     if (container && *container == FileKind::exr) {
-        o.open.set.deepColour = true;
+        o.open = o.open.into(o.output);
         if (o.colour == "jpeg")
             STX_CHECK(command.refuse(
                 {"--colour"}, "jpeg is of MPEG-4 containers; .exr keeps colours as they are"));

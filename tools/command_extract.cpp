@@ -151,8 +151,12 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
             o.input, o.open, o.output,
             wanted.as == ExtractAs::pair ? DepthPicture::pair : DepthPicture::sideBySide, o.view,
             o.time, o.refine, program);
+    // As exact as PNG for what is JPEG already, and smaller than to code it again.
+    o.open.keepColourFiles = wanted.ending == ".html" && o.colour != "png" && !o.quality;
     if (wanted.shown)
         return extractShown(o.input, o.open, o.output, o.time, o.refine, modelOf(o), program);
+    // Other programs' workspaces have pictures of 8 bits.
+    o.open.set.deepColour = !wanted.points && o.cameras == "transforms";
     const bool points = wanted.points, draco = wanted.ending == ".drc";
     STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
     STX_TRY(frames, refined(std::move(frames), o.refine,
@@ -279,10 +283,12 @@ void addExtract(CommandLine& line, Program& program) {
              "the views goes first (default: all)")
         .range(1, 2000000000)
         .takes("N");
-    c.option("--colour", o->colour,
-             "Of .html and of surfaces (.glb): png (exact) or jpeg (default png; of surfaces with "
-             "--triangles jpeg). In the folder, of colours in linear light and of 16 bits: exr "
-             "(exact) or png (16-bit sRGB, exact for what was that) (default exr)")
+    c.option(
+         "--colour", o->colour,
+         "Of .html and of surfaces (.glb): png (exact) or jpeg (default png; of surfaces with "
+         "--triangles jpeg; .html copies the JPEG pictures of an input that has such, unless png "
+         "or --quality is given). In the folder, of colours in linear light and of 16 bits: exr "
+         "(exact) or png (16-bit sRGB, exact for what was that) (default exr)")
         .oneOf({"png", "jpeg", "exr"});
     c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100);
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);

@@ -231,7 +231,7 @@ Result<std::vector<std::string>> objectNames(const PackOptions& o) {
 Result<PackObject> openObject(const PackOptions& o, const std::string& input,
                               const std::string& name, Job& job) {
     preloadCodecs(input);
-    STX_TRY(auto frames, openSequence(input, o.open, job));
+    STX_TRY(auto frames, openSequence(input, o.open.into(o.output), job));
     STX_TRY(frames, refined(std::move(frames), o.refine, peak::kAtlas));
     const Timeline timeline = frames->timeline();
     std::size_t moment = 0;
@@ -322,7 +322,7 @@ Result<int> packInput(const PackOptions& options, Program& program) {
     if (o.inputs.size() > 1 || !o.names.empty()) return packSheet(o, program);
     o.input = o.inputs.front();
     preloadCodecs(o.input);
-    STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
+    STX_TRY(auto frames, openSequence(o.input, o.open.into(o.output), program.job));
     // One atlas for each frame is made in two passes.
     const bool twice = frames->timeline().moves() && !o.time;
     STX_TRY(frames,

@@ -58,7 +58,7 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
     OpenOptions open;
     open.object = o.object;
     refining.import(open.set);
-    STX_TRY(auto frames, openSequence(o.input, open, program.job));
+    STX_TRY(auto frames, openSequence(o.input, open.into(o.output), program.job));
     const Timeline timeline = frames->timeline();
     if (timeline.moves() && settings.on(RefineStep::poses))
         return fail(

@@ -323,6 +323,7 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     STX_TRY(auto writing, writingOf(o, program));
 
     keepFreedMemory();
+    o.open = o.open.into(o.fileFormat == "exr" ? "stream.exr" : o.output);
     preloadCodecs(o.input);
     STX_TRY(const auto around, environmentOf(o.environment, program.job));
     if (around) {

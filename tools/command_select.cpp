@@ -106,7 +106,7 @@ Result<int> select(const SelectOptions& o, const Command& command, Program& prog
         STX_TRY(const auto opened, openRenderable(o.input, o.open, program.job));
         return selectAroundMesh(std::get<Mesh>(opened), o, command, program);
     }
-    STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
+    STX_TRY(auto frames, openSequence(o.input, o.open.into(o.output), program.job));
     const Timeline timeline = frames->timeline();
     if (timeline.moves() && !holdsSequences(o.output))
         return fail(

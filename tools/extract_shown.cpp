@@ -28,7 +28,7 @@ Result<Shown> writePage(const std::string& input, const OpenOptions& open,
                         const std::string& output, const std::string& refine, int jpegQuality,
                         Program& program) {
     PageOptions write;
-    write.jpegQuality = jpegQuality;
+    write.colours = {jpegQuality, open.keepColourFiles};
     // Without its folder: pages of the same input are the same wherever it lies.
     const std::filesystem::path path(input);
     write.input = (path.has_filename() ? path : path.parent_path()).filename().string();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "formats/imagesets/image_sets.hpp"
@@ -14,7 +15,16 @@ struct OpenOptions {
     bool timesFromStart = false;
     /// Of an atlas with several objects: the name of the one to open.
     std::string object;
+    bool keepColourFiles = false;  ///< MPEG-4: see ColourFile
     ImageSetOptions set;  ///< of image sets; with set.from whatever is given is read as one
+
+    /// The same for what is written to `target`: an OpenEXR file keeps colours of 16 bits.
+    [[nodiscard]] OpenOptions into(const std::filesystem::path& target) const {
+        OpenOptions out = *this;
+        const std::filesystem::path ending = target.extension();
+        out.set.deepColour = set.deepColour || ending == ".exr" || ending == ".EXR";
+        return out;
+    }
 };
 
 struct SaveOptions {

@@ -194,6 +194,7 @@ Result<std::unique_ptr<Sequence>> openFrames(const fs::path& path, const OpenOpt
         mpeg4::SceneReadOptions read;
         read.folder = folderOf(path);
         read.timesFromStart = options.timesFromStart;
+        read.keepColourFiles = options.keepColourFiles;
         auto sequence = mpeg4::sequenceFromScene(std::move(document), read, job);
         if (!sequence)
             return tl::unexpected(sequence.error().at(fmt::format("'{}'", path.string())));

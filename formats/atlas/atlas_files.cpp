@@ -245,7 +245,7 @@ Result<void> readImage(const fs::path& file, const AtlasHeader& header, const At
         STX_CHECK(checkPartSize(reader, 0, header));
         return readFloats(reader, 0, {t.attribute}, header.linear, page);
     }
-    STX_TRY(const auto bytes, readFile(file, limits));
+    STX_TRY(auto bytes, readFile(file, limits));
     STX_TRY(auto image, decodeImage(bytes, file.string(), limits));
     const int channels = t.attribute == "depth" ? 1 : t.coding == "sRGB8" ? 4 : 3;
     const bool material = t.attribute == "metallic_roughness" || t.attribute == "emissive";
@@ -260,6 +260,8 @@ Result<void> readImage(const fs::path& file, const AtlasHeader& header, const At
     if (t.attribute == "colour") {
         // The depth texture's alpha is put in when all images are read.
         page.texture = Texture(rgba8From(image));
+        if (t.coding == kOpaque)
+            page.colourFile.jpeg = std::make_shared<const Bytes>(std::move(bytes));
         return {};
     }
     if (t.attribute == "depth") {

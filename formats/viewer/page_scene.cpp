@@ -66,6 +66,38 @@ Result<std::vector<PageImages>> splatImages(const Atlas& atlas, Job& job) {
     return out;
 }
 
+/// Whether a JPEG file gives exactly these colours, whatever their alpha, and browsers decode it as
+/// we do: Exif may turn a picture for them, and more than three channels are inks.
+bool isExact(const ColourFile& file, const Texture& texture, const Limits& limits) {
+    constexpr std::string_view kExif("Exif\0\0", 6);
+    const Rgba8Image* colour = texture.rgba8();
+    if (!file.jpeg || !colour) return false;
+    const std::string_view text(reinterpret_cast<const char*>(file.jpeg->data()),
+                                file.jpeg->size());
+    const auto info = probeImage(*file.jpeg);
+    if (!info || info->channels > 3 || text.find(kExif) != text.npos) return false;
+    const auto picture = decodeRgba8(*file.jpeg, "a view's colours", limits);
+    if (!picture || picture->width() < file.x + colour->width() ||
+        picture->height() < file.y + colour->height())
+        return false;
+    for (int y = 0; y < colour->height(); ++y) {
+        for (int x = 0; x < colour->width(); ++x) {
+            if (glm::u8vec3(picture->at(file.x + x, file.y + y)) != glm::u8vec3(colour->at(x, y)))
+                return false;
+        }
+    }
+    return true;
+}
+
+/// Alpha as an image of its own, where some is not full.
+Result<void> addAlpha(const Rgba8Image& colour, PageImages& out) {
+    if (std::ranges::all_of(colour.pixels(), [](glm::u8vec4 c) { return c.a == 255; })) return {};
+    std::vector<std::uint8_t> alpha(colour.count());
+    std::ranges::transform(colour.pixels(), alpha.begin(), [](glm::u8vec4 c) { return c.a; });
+    STX_TRY(out["alpha"], encodePng(colour.width(), colour.height(), 1, 8, alpha.data(), false));
+    return {};
+}
+
 /// Colour, and alpha where JPEG has no room for it.
 Result<PageImages> colourImages(const Rgba8Image& colour, int jpegQuality) {
     const glm::ivec2 size = colour.size();
@@ -82,20 +114,24 @@ Result<PageImages> colourImages(const Rgba8Image& colour, int jpegQuality) {
     // As PNG a tenth smaller than with alpha.
     STX_TRY(out["colour"], jpegQuality > 0 ? encodeJpeg(size.x, size.y, 3, &rgb[0].r, jpegQuality)
                                            : encodePng(size.x, size.y, 3, 8, rgb.data(), true));
-    if (opaque) return out;
-    std::vector<std::uint8_t> alpha(colour.count());
-    std::ranges::transform(colour.pixels(), alpha.begin(), [](glm::u8vec4 c) { return c.a; });
-    STX_TRY(out["alpha"], encodePng(size.x, size.y, 1, 8, alpha.data(), false));
+    STX_CHECK(addAlpha(colour, out));
     return out;
 }
 
-Result<PageImages> imagesOf(const Atlas& atlas, std::size_t number, int jpegQuality) {
+Result<PageImages> imagesOf(const Atlas& atlas, std::size_t number, const PageColours& colours,
+                            bool ofViews, const Limits& limits) {
     const AtlasPage& page = atlas.pages[number];
     const glm::ivec2 size = page.depth.size();
     const auto* colour = page.texture.rgba8();
     if (!colour)
         return fail(ErrorCode::invalidInput, "the colour of a page must be 8-bit sRGB, not linear");
-    STX_TRY(PageImages out, colourImages(*colour, jpegQuality));
+    PageImages out;
+    if (ofViews || (colours.copies && isExact(page.colourFile, page.texture, limits))) {
+        if (!ofViews) out["colour"] = *page.colourFile.jpeg;
+        STX_CHECK(addAlpha(*colour, out));
+    } else {
+        STX_TRY(out, colourImages(*colour, colours.jpegQuality));
+    }
     const DepthCodes codes = depthCodes(atlas, static_cast<int>(number));
     const bool small =
         std::ranges::all_of(atlas.views, [](const ReferenceView& v) { return v.depthBits == 8; });
@@ -190,7 +226,12 @@ Result<std::vector<Atlas>> packForPage(const Bundle& bundle, bool apart, Job& jo
     return atlases;
 }
 
-Result<PageScene> pageScene(std::span<const Atlas> atlases, int jpegQuality, Job& job) {
+void keepExactFiles(Bundle& bundle, const Limits& limits) {
+    for (ReferenceView& view : bundle.views)
+        if (!isExact(view.colourFile, view.texture, limits)) view.colourFile = {};
+}
+
+Result<PageScene> pageScene(std::span<const Atlas> atlases, const PageColours& colours, Job& job) {
     PageScene out;
     Json& j = out.description;
     bool pruned = false, partial = false;
@@ -203,6 +244,10 @@ Result<PageScene> pageScene(std::span<const Atlas> atlases, int jpegQuality, Job
         partial = partial || atlas.keptPixels < atlas.sourcePixels;
         const auto firstView = static_cast<int>(views.size());
         const auto firstPage = static_cast<int>(out.pages.size());
+        const bool ofViews =
+            colours.copies && std::ranges::all_of(atlas.views, [](const ReferenceView& v) {
+                return v.colourFile.jpeg != nullptr;
+            });
         for (const ReferenceView& view : atlas.views) {
             if (view.depthBits == 32)
                 return fail(ErrorCode::invalidInput,
@@ -213,6 +258,7 @@ Result<PageScene> pageScene(std::span<const Atlas> atlases, int jpegQuality, Job
             v["nearPlane"] = view.nearPlane;
             v["farPlane"] = view.farPlane;
             v["dmax"] = view.depthCode().dmax;
+            if (ofViews) v["colourAt"] = {view.colourFile.x, view.colourFile.y};
             views.push_back(std::move(v));
         }
         for (const AtlasRectangle& r : atlas.rectangles)
@@ -225,8 +271,10 @@ Result<PageScene> pageScene(std::span<const Atlas> atlases, int jpegQuality, Job
         }
         for (std::size_t i = 0; i < pages.size(); ++i) {
             STX_CHECK(job.checkCancelled());
-            STX_TRY(auto images, imagesOf(atlas, i, jpegQuality));
+            STX_TRY(auto images, imagesOf(atlas, i, colours, ofViews, job.limits));
             pages[i].merge(images);
+            for (std::size_t k = 0; ofViews && i == 0 && k < atlas.views.size(); ++k)
+                pages[i][fmt::format("view{}", firstView + k)] = *atlas.views[k].colourFile.jpeg;
             out.pages.push_back(std::move(pages[i]));
             out.owners.push_back(number);
         }

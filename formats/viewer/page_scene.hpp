@@ -15,9 +15,17 @@
 namespace stx {
 
 /// The textures of one page of an atlas as PNG files, by the names that the viewer has for them:
-/// "colour", "depth", "normal", "splat"; colour may be JPEG, with "alpha" where some is not full.
-/// See writeViewerPage() for what they hold.
+/// "colour", "depth", "normal", "splat"; colour may be JPEG, with "alpha" where some is not full,
+/// or missing where the pictures of the views themselves, "view0" and so on, are with the first
+/// page. See writeViewerPage() for what they hold.
 using PageImages = std::map<std::string, Bytes>;
+
+/// How colour is written.
+struct PageColours {
+    int jpegQuality = 0;  ///< 0 = PNG, exact; 1..100 = JPEG, alpha beside it exact
+    /// Where the input's colours are JPEG files (ColourFile) these are copied, whatever else holds.
+    bool copies = false;
+};
 
 /// Views as the viewer reads them.
 struct PageScene {
@@ -36,10 +44,13 @@ void makeViewable(Bundle& bundle, Job& job);
 /// frame is the same image. Then a view without content has none: an atlas without views. Errors:
 /// those of pack().
 [[nodiscard]] Result<std::vector<Atlas>> packForPage(const Bundle& bundle, bool apart, Job& job);
-/// All atlases as one scene, colour as JPEG of a quality from 1 on. Errors: one that fails check()
-/// but for those without views, linear colour or depth of 32 bits (invalidInput), memory.
-[[nodiscard]] Result<PageScene> pageScene(std::span<const Atlas> atlases, int jpegQuality,
-                                          Job& job);
+/// Takes away the JPEG files of views whose colours are not exactly those that they decode to.
+void keepExactFiles(Bundle& bundle, const Limits& limits);
+/// All atlases as one scene; ColourFile of views have passed keepExactFiles(). Errors: one that
+/// fails check() but for those without views, linear colour or depth of 32 bits (invalidInput),
+/// memory.
+[[nodiscard]] Result<PageScene> pageScene(std::span<const Atlas> atlases,
+                                          const PageColours& colours, Job& job);
 
 /// A vector, as JSON has it.
 [[nodiscard]] std::vector<double> listOf(glm::dvec3 v);

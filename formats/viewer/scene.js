@@ -67,14 +67,22 @@ class Scene {
         scene.rectangles = data.rectangles.map(([view, page, viewX, viewY, x, y, width, height, turn]) =>
             ({view, page, viewX, viewY, x, y, width, height, turned: turn === 1}));
         for (const r of scene.rectangles) r.camera = windowOf(scene.views[r.view], r);
-        const pages = [];
+        const pages = [], ofViews = [];
         for (const page of data.pages) {
             const decoded = {};
-            for (const name of Object.keys(page)) decoded[name] = await image(page[name]);
-            decoded.colour = withAlpha(decoded.colour);
-            if (decoded.alpha) decoded.alpha.values.forEach((a, i) => decoded.colour.values[4 * i + 3] = a);
-            delete decoded.alpha;
+            for (const name of Object.keys(page)) {
+                if (name.startsWith("view")) ofViews.push([Number(name.slice(4)), page[name]]);
+                else decoded[name] = await image(page[name]);
+            }
+            const {width, height} = decoded.depth;
+            decoded.colour = decoded.colour ? withAlpha(decoded.colour) :
+                {width, height, channels: 4, values: new Uint8Array(4 * width * height).fill(255)};
             pages.push(decoded);
+        }
+        for (const [view, number] of ofViews) scene.paint(pages, view, await image(number), data.padding);
+        for (const page of pages) {
+            if (page.alpha) page.alpha.values.forEach((a, i) => page.colour.values[4 * i + 3] = a);
+            delete page.alpha;
         }
         const width = Math.max(...pages.map((p) => p.colour.width)), height = Math.max(...pages.map((p) => p.colour.height));
         for (const page of pages)
@@ -84,6 +92,24 @@ class Scene {
         scene.findBlocks(pages);
         scene.makeCover(pages, data.partial);
         return scene;
+    }
+
+    // Colours of a view's own picture, with as many texels around its rectangles as stx leaves; beyond the view its edge.
+    paint(pages, number, picture, padding) {
+        const view = this.views[number], [left, top] = view.colourAt, from = picture.values;
+        const inside = (value, size) => Math.max(0, Math.min(size - 1, value));
+        for (const r of this.rectangles) {
+            if (r.view !== number) continue;
+            const {width, height, values} = pages[r.page].colour;
+            for (let j = Math.max(-padding, -r.y); j < Math.min(r.height + padding, height - r.y); ++j) {
+                for (let i = Math.max(-padding, -r.x); i < Math.min(r.width + padding, width - r.x); ++i) {
+                    const x = left + inside(r.viewX + (r.turned ? j : i), view.width);
+                    const y = top + inside(r.viewY + (r.turned ? r.width - 1 - i : j), view.height);
+                    const to = 4 * ((r.y + j) * width + r.x + i), at = picture.channels * (y * picture.width + x);
+                    for (let k = 0; k < 3; ++k) values[to + k] = from[at + k];
+                }
+            }
+        }
     }
 
     upload(pages) {

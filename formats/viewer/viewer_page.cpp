@@ -320,6 +320,7 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
         STX_TRY(Bundle bundle, frames.frame(i, job));
         STX_CHECK(checkPeak(peak::kPage, bundle.views, job.limits));
         makeViewable(bundle, job);
+        if (options.colours.copies) keepExactFiles(bundle, job.limits);
         if (!writer) {
             bundle.noteMaterialLeftOut(job);
             noteEnvironmentLeftOut(bundle.environment, job);
@@ -340,7 +341,7 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
         std::erase_if(parts, [](const Bundle& b) { return b.views.empty(); });
         for (std::size_t k = 0; k < parts.size(); ++k) {
             STX_TRY(const auto atlases, packForPage(parts[k], line.moves(), job));
-            STX_TRY(auto scene, pageScene(atlases, options.jpegQuality, job));
+            STX_TRY(auto scene, pageScene(atlases, options.colours, job));
             STX_TRY(const int number, writer->add(k, std::move(scene)));
             numbers.push_back(number);
         }
@@ -374,7 +375,7 @@ Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::pa
     STX_TRY(const PageSet set, PageSet::of(atlas, job));
     STX_TRY(Json data,
             dataOf(atlas.views, set.bounds(), atlas.origin, Timeline(), options, writer.report));
-    STX_TRY(auto scene, pageScene({&atlas, 1}, options.jpegQuality, job));
+    STX_TRY(auto scene, pageScene({&atlas, 1}, options.colours, job));
     STX_TRY(const int number, writer.add(0, std::move(scene)));
     data["frames"] = {{number}};
     STX_CHECK(writer.finish(data));

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "formats/files/files.hpp"
+#include "formats/viewer/page_scene.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/atlas.hpp"
 #include "lib/model/sequence.hpp"
@@ -18,7 +19,7 @@ struct PageOptions {
     std::string input;
     /// What browsers show as its name; empty: the bundle's title, else the input's name.
     std::string title;
-    int jpegQuality = 0;  ///< of colour: 0 = PNG, exact; 1..100 = JPEG, alpha beside it exact
+    PageColours colours;
     OutputFile::Options output = {};
 };
 
@@ -36,11 +37,12 @@ void noteEnvironmentLeftOut(const std::shared_ptr<const Environment>& environmen
 
 /// Writes one HTML file, whole or not at all, that draws a bundle in any browser with WebGL 2 and
 /// needs nothing else: Lee & Park's path with stx's splats (formats/viewer). The views of each
-/// frame are merged into at most four textures (pack(), tight), each a PNG: colour in 8 bits,
-/// with alpha where some is not full, depth as DepthImage codes of 8 or 16 bits, normals in 8 bits,
-/// tilts and sizes of splats in 8 bits. Background views have textures of their own, and in films
-/// all views do: images that are the same as those of the frame before are written once. The page
-/// is UTF-16, takes 1.03 bytes for each of the images (pageText()) and about 30 kB.
+/// frame are merged into at most four textures (pack(), tight), each a PNG: colour in 8 bits, with
+/// alpha where some is not full (or JPEG, as PageColours says), depth as DepthImage codes of 8 or
+/// 16 bits, normals in 8 bits, tilts and sizes of splats in 8 bits. Background views have textures
+/// of their own, and in films all views do: images that are the same as those of the frame before
+/// are written once. The page is UTF-16, takes 1.03 bytes for each of the images (pageText()) and
+/// about 30 kB.
 ///
 /// Notes: colours of linear light become 8-bit sRGB, depth of 32 bits becomes 16; a page that
 /// browsers find hard to hold. Errors: those of the sequence and of pack(); files; cancelled.

@@ -43,6 +43,7 @@ struct AtlasRectangle {
 /// One page of an atlas: its textures all have the same size.
 struct AtlasPage {
     Texture texture;
+    ColourFile colourFile;    ///< as in views
     Image<float> depth;       ///< distances in scene units, kNoDepth outside
     Image<glm::vec3> normal;  ///< empty when absent
     Image<glm::vec3> splatU;  ///< empty when absent

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <glm/glm.hpp>
 
@@ -53,6 +56,14 @@ struct Refined {
     bool operator==(const Refined&) const = default;
 };
 
+/// The JPEG file that colours were decoded from, where a reader was asked to keep it, for writers
+/// that would rather copy it than code the colours again. Whoever changes the colours need not
+/// know of it: writers compare what it decodes to.
+struct ColourFile {
+    std::shared_ptr<const std::vector<std::byte>> jpeg;  ///< null: none
+    int x = 0, y = 0;  ///< where the first pixel of the colours is in its picture
+};
+
 /// What is said of a view beside its images.
 struct ViewHeader {
     std::string name;  ///< unique in its bundle; becomes part and file names
@@ -71,6 +82,7 @@ struct ViewHeader {
     /// Renderers use it only where no other view shows a surface.
     bool background = false;
     Refined refined;
+    ColourFile colourFile;
 
     /// Whether a pixel of full alpha without a depth is a surface whose distance is not known.
     [[nodiscard]] bool depthMayBeUnknown() const { return pruned || noDepth == NoDepth::unknown; }

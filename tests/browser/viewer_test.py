@@ -80,8 +80,23 @@ def models(test, browser, args):
     test.compare(browser, "amphora, pruned, as an atlas", "atlas.html", "atlas", "-1.5,1.4,2.2", "0,0.5,0")
     test.stx_run("extract", "amphora.mp4", "-o", "jpeg.html", "--colour", "jpeg")
     test.compare(browser, "amphora, with JPEG", "jpeg.html", "amphora.mp4", "1.5,1.2,2.5", "0,0.5,0")
+    copied_pictures(test, browser)
     test.compare(browser, "amphora, from afar", "amphora.html", "amphora.mp4", "4,3,9", "0,0.5,0")
     test.compare(browser, "amphora, near", "amphora.html", "amphora.mp4", "0.9,1.1,1.1", "0.1,0.7,0")
+
+
+def copied_pictures(test, browser):
+    """JPEG pictures of a bundle are in its page as they are, and browsers decode them as stx does."""
+    test.stx_run("convert", "amphora.mp4", "-o", "streams.mp4", "--colour", "jpeg")
+    test.stx_run("extract", "streams.mp4", "-o", "exact.html", "--colour", "png")
+    test.stx_run("extract", "streams.mp4", "-o", "streams.html")
+    sizes = [os.path.getsize(test.path(f"{name}.html")) for name in ("streams", "exact")]
+    test.check(sizes[0] < 0.8 * sizes[1], f"amphora of JPEG pictures: {sizes[0]} bytes, as PNG {sizes[1]}")
+    for name in ("exact", "streams"):
+        test.compare(browser, f"amphora of JPEG pictures, {name}", f"{name}.html", "streams.mp4", "1.5,1.2,2.5", "0,0.5,0")
+        os.replace(test.path("shot.png"), test.path(f"{name}.png"))
+    found = psnr(test.stx, "streams.png", "exact.png", test.folder)
+    test.check(found >= 60, f"the browser's decoder against stx's: {found:.1f} dB")
 
 
 def bounds_of(test, name):

@@ -47,6 +47,8 @@ struct SceneReadOptions {
     /// startTime and stopTime that come with a later access unit count from the scene's start; see
     /// SceneInTime.
     bool timesFromStart = false;
+    /// Views keep the JPEG files that their colours come from.
+    bool keepColourFiles = false;
     /// A note of what moves, and is read as it is at its start.
     bool noteMotion = true;
 };

@@ -131,6 +131,8 @@ void removePadding(ReferenceView& view, const ViewNotes::Pad& pad) {
     view.normal = view.normal.part(pad.left, pad.top, width, height);
     view.splatU = view.splatU.part(pad.left, pad.top, width, height);
     view.splatV = view.splatV.part(pad.left, pad.top, width, height);
+    view.colourFile.x += pad.left;
+    view.colourFile.y += pad.top;
     c.width = width;
     c.height = height;
     c.cx = pad.cx;

@@ -147,6 +147,11 @@ Result<ReferenceView> ViewReader::readSimpleTexture(const ViewPlan& plan) const 
         for (std::size_t i = 0; i < pixels.count(); ++i)
             pixels.pixels()[i].a = hasPoint(view.depth.pixels()[i]) ? 255 : 0;
     view.texture = Texture(std::move(pixels));
+    if (options_.keepColourFiles && colourNode && !colourNode->is("PixelTexture")) {
+        STX_TRY(auto bytes, images_.load(*colourNode, job_.limits));
+        if (const auto info = probeImage(bytes); info && info->format == "jpeg")
+            view.colourFile.jpeg = std::make_shared<const Bytes>(std::move(bytes));
+    }
 
     if (plan.texture->is("SimpleTextureV2")) STX_CHECK(readVectors(plan, view));
     return view;

@@ -33,8 +33,8 @@ struct ViewSurface {
 /// triangles, but keep all pixels of their border, so that no gaps open. Pixels that are covered by
 /// less than a half are left out. A place that several views show is kept of those that sample it
 /// most densely, within a tenth: what a view sees at a grazing angle does not hide what another
-/// sees in full. A view with an edge or a crease there does not count as showing it, so that all
-/// keep their triangles and no gap opens. Background views come last in that choice.
+/// sees in full. A view with an edge there does not count as showing it, one with a crease there
+/// must be much denser, so that no gap opens. Background views come last in that choice.
 ///
 /// Errors: a bundle that fails check(), memory over the limit, cancelled.
 [[nodiscard]] Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job);

@@ -67,43 +67,43 @@ TEST(ViewSurfaces, KeepEveryPlaceOfSomeView) {
     }
 }
 
-/// A ridge, z = -|x|, seen from its two sides.
-Bundle ridge() {
-    Bundle bundle;
-    for (const double angle : {0.5, -0.4, 0.1}) {
-        ReferenceView& view = bundle.views.emplace_back();
-        const glm::dquat turned = glm::angleAxis(angle, glm::dvec3(0, 1, 0));
-        view.name = "side";
-        view.camera = Camera::fromFieldOfView(turned * glm::dvec3(0, 0, 4), turned, {0.4, 0.4},
-                                              false, 64, 64);
-        view.nearPlane = 1;
-        view.farPlane = 10;
-        view.depth = Image<float>(64, 64);
-        view.texture = Rgba8Image(64, 64, glm::u8vec4(90, 90, 90, 255));
-        for (int y = 0; y < 64; ++y) {
-            for (int x = 0; x < 64; ++x) {
-                double low = 1, high = 9;
-                for (int k = 0; k < 40; ++k) {
-                    const double middle = (low + high) / 2;
-                    const glm::dvec3 at = view.camera.position +
-                                          turned * view.camera.unproject(x + 0.5, y + 0.5, middle);
-                    (at.z > -std::abs(at.x) ? low : high) = middle;
-                }
-                view.depth.at(x, y) = static_cast<float>(low);
+/// A view of where a space ends in which all places are `free`.
+template <class Free>
+ReferenceView viewOf(const Free& free, glm::dvec3 eye, glm::dquat turned, double fovRad, int side) {
+    ReferenceView view;
+    view.name = "side";
+    view.camera = Camera::fromFieldOfView(eye, turned, {fovRad, fovRad}, false, side, side);
+    view.nearPlane = 0.1;
+    view.farPlane = 30;
+    view.depth = Image<float>(side, side);
+    view.texture = Rgba8Image(side, side, glm::u8vec4(90, 90, 90, 255));
+    for (int y = 0; y < side; ++y) {
+        for (int x = 0; x < side; ++x) {
+            double low = 0.1, high = 29;
+            for (int k = 0; k < 40; ++k) {
+                const double middle = (low + high) / 2;
+                const glm::dvec3 at =
+                    eye + turned * view.camera.unproject(x + 0.5, y + 0.5, middle);
+                (free(at) ? low : high) = middle;
             }
+            view.depth.at(x, y) = static_cast<float>(low);
         }
     }
-    return bundle;
+    return view;
 }
 
-TEST(ViewSurfaces, LeaveNoGapsAtCreases) {
-    Job job;
-    const auto surfaces = viewSurfaces(ridge(), job);
-    ASSERT_TRUE(surfaces) << surfaces.error().text();
+/// Beside a ridge, z = -|x|, seen with a turn around Y.
+ReferenceView ridgeFrom(glm::dvec3 eye, double angle) {
+    return viewOf([](glm::dvec3 at) { return at.z > -std::abs(at.x); }, eye,
+                  glm::angleAxis(angle, glm::dvec3(0, 1, 0)), 0.4, 64);
+}
+
+/// How many of 160 x 160 places around the middle, seen from above, no triangle covers.
+std::ptrdiff_t gaps(const std::vector<ViewSurface>& surfaces, double width) {
     constexpr int kSide = 160;
-    Image<std::uint8_t> covered(kSide, kSide, 0);  // from above, 0.4 wide around the middle
-    const auto placeOf = [](double at) { return (at / 0.4 + 0.5) * kSide; };
-    for (const ViewSurface& s : *surfaces) {
+    Image<std::uint8_t> covered(kSide, kSide, 0);
+    const auto placeOf = [&](double at) { return (at / width + 0.5) * kSide; };
+    for (const ViewSurface& s : surfaces) {
         for (std::size_t t = 0; t < s.triangles.size(); t += 3) {
             glm::dvec2 p[3];
             for (std::size_t k = 0; k < 3; ++k) {
@@ -125,7 +125,54 @@ TEST(ViewSurfaces, LeaveNoGapsAtCreases) {
             }
         }
     }
-    EXPECT_EQ(std::ranges::count(covered.pixels(), 0), 0);
+    return std::ranges::count(covered.pixels(), 0);
+}
+
+TEST(ViewSurfaces, LeaveNoGapsAtCreases) {
+    Job job;
+    Bundle bundle;
+    for (const double angle : {0.5, -0.4, 0.1})
+        bundle.views.push_back(
+            ridgeFrom(glm::angleAxis(angle, glm::dvec3(0, 1, 0)) * glm::dvec3(0, 0, 4), angle));
+    const auto surfaces = viewSurfaces(bundle, job);
+    ASSERT_TRUE(surfaces) << surfaces.error().text();
+    EXPECT_EQ(gaps(*surfaces, 0.4), 0);
+}
+
+/// Which view is the densest changes within large triangles.
+TEST(ViewSurfaces, LeaveNoGapsOnWalls) {
+    Job job;
+    Bundle bundle;
+    const auto room = [](glm::dvec3 at) {
+        return std::abs(at.x) < 2 && std::abs(at.y) < 1.5 && at.z > 0 && at.z < 6;
+    };
+    const std::pair<glm::dvec3, glm::dvec3> places[] = {
+        {{0, 0, 5.5}, {0, -0.1, 0}},        {{-1.5, 0.5, 4}, {1.5, -0.5, 0.5}},
+        {{1.5, 0.5, 4}, {-1.5, -0.5, 0.5}}, {{0, 1.1, 3}, {0.3, -1.5, 1}},
+        {{0, -1, 3}, {-0.3, 1.5, 1}},       {{1.2, 0, 2}, {-2, -0.3, 1.4}},
+        {{-1.2, -0.3, 2}, {2, 0.1, 1.4}}};
+    for (const auto& [eye, target] : places)
+        bundle.views.push_back(viewOf(room, eye, *lookAt(eye, target), 1.0472, 256));
+    const auto surfaces = viewSurfaces(bundle, job);
+    ASSERT_TRUE(surfaces) << surfaces.error().text();
+    EXPECT_EQ(gaps(*surfaces, 2.8), 0);
+}
+
+/// What is seen from afar would lie on the other face there, as a stripe of its colour.
+TEST(ViewSurfaces, TakeCreasesFromNearViews) {
+    Job job;
+    Bundle bundle;
+    bundle.views.push_back(ridgeFrom({0.3, 0, 2}, 0.1));
+    bundle.views.push_back(ridgeFrom({-0.3, 0, 10}, 0));
+    const auto surfaces = viewSurfaces(bundle, job);
+    ASSERT_TRUE(surfaces) << surfaces.error().text();
+    EXPECT_EQ(gaps(*surfaces, 0.4), 0);
+    const ViewSurface& far = surfaces->back();
+    ASSERT_FALSE(far.triangles.empty());
+    for (const std::uint32_t corner : far.triangles) {
+        const glm::vec3 p = far.positions[corner];
+        EXPECT_GT(std::max(std::abs(p.x), std::abs(p.y)), 0.1f);
+    }
 }
 
 /// A grey disc before a red wall, with the mean colour of each pixel's place as renderers have it.

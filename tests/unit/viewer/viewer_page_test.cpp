@@ -100,7 +100,7 @@ ReadPage readPage(const std::filesystem::path& path) {
 }
 
 Result<PageReport> write(Bundle bundle, const std::filesystem::path& path, Job& job,
-                         const PageOptions& options = {"bundle.mp4", {}, {}}) {
+                         const PageOptions& options = {"bundle.mp4", {}, {}, {}}) {
     const auto still = sequenceOf(std::move(bundle));
     return writeViewerPage(*still, path, options, job);
 }
@@ -237,7 +237,8 @@ TEST(ViewerPage, WritesWhatStaysOfAFilmOnce) {
     const TemporaryFolder folder;
     Job job;
     HalfStill film;
-    const auto report = writeViewerPage(film, folder.path() / "a.html", {"film.mp4", {}, {}}, job);
+    const auto report =
+        writeViewerPage(film, folder.path() / "a.html", {"film.mp4", {}, {}, {}}, job);
     ASSERT_TRUE(report) << report.error().text();
     const ReadPage page = readPage(folder.path() / "a.html");
     EXPECT_EQ(page.json("data")["frames"], Json::parse("[[0,1],[0,1],[2,1]]"));
@@ -263,7 +264,7 @@ TEST(ViewerPage, WritesEachPictureOfAFilmOnce) {
     const TemporaryFolder folder;
     Job job;
     ThreeRates film;
-    ASSERT_TRUE(writeViewerPage(film, folder.path() / "a.html", {"film.mp4", {}, {}}, job));
+    ASSERT_TRUE(writeViewerPage(film, folder.path() / "a.html", {"film.mp4", {}, {}, {}}, job));
     const ReadPage page = readPage(folder.path() / "a.html");
     // 4, 2 and 2 colours and the depths.
     EXPECT_EQ(page.count("image"), 4 + 2 + 2 + 3);
@@ -279,11 +280,75 @@ TEST(ViewerPage, TakesAnAtlasAsItIs) {
     const Bundle bundle = smallBundle(4, 16, false, false);
     const auto atlas = pack(bundle, {}, job);
     ASSERT_TRUE(atlas);
-    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "a.html", {"atlas", {}, {}}, job));
+    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "a.html", {"atlas", {}, {}, {}}, job));
     const ReadPage page = readPage(folder.path() / "a.html");
     const auto colour = page.image(page.json("scene0")["pages"][0]["colour"]);
     EXPECT_EQ(colour.width, atlas->width());
     EXPECT_EQ(colour.height, atlas->height());
+}
+
+/// Views whose colours come from JPEG pictures that are larger than they are.
+Bundle fromJpeg() {
+    Bundle bundle = smallBundle(3, 16, false, false);
+    for (ReferenceView& view : bundle.views) {
+        Rgba8Image& colour = *view.texture.rgba8();
+        const int width = colour.width() + 5, height = colour.height() + 4;
+        std::vector<glm::u8vec3> rgb(static_cast<std::size_t>(width * height));
+        for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] = {i * 37, i * i, i / 3};
+        auto jpeg = encodeJpeg(width, height, 3, &rgb[0].r, 60);
+        EXPECT_TRUE(jpeg);
+        view.colourFile = {std::make_shared<const Bytes>(std::move(*jpeg)), 3, 2};
+        const auto picture = decodeRgba8(*view.colourFile.jpeg, "", Limits());
+        EXPECT_TRUE(picture);
+        for (int y = 0; y < colour.height(); ++y)
+            for (int x = 0; x < colour.width(); ++x)
+                colour.at(x, y) = {glm::u8vec3(picture->at(x + 3, y + 2)), colour.at(x, y).a};
+    }
+    return bundle;
+}
+
+TEST(ViewerPage, CopiesTheJpegFilesOfViews) {
+    const TemporaryFolder folder;
+    Job job;
+    const Bundle bundle = fromJpeg();
+    ASSERT_TRUE(write(bundle, folder.path() / "a.html", job, {"a.mp4", {}, {.copies = true}, {}}));
+    const ReadPage page = readPage(folder.path() / "a.html");
+    const Json scene = page.json("scene0");
+    ASSERT_EQ(scene["views"].size(), 3u);
+    for (std::size_t k = 0; k < 3; ++k) {
+        const int number = scene["pages"][0]["view" + std::to_string(k)];
+        EXPECT_EQ(bytesOfPageText(page.scripts.at(fmt::format("image{}", number))),
+                  *bundle.views[k].colourFile.jpeg);
+        EXPECT_EQ(scene["views"][k]["colourAt"], Json::parse("[3,2]"));
+    }
+    EXPECT_FALSE(scene["pages"][0].contains("colour"));
+    EXPECT_TRUE(scene["pages"][0].contains("alpha"));
+}
+
+TEST(ViewerPage, CopiesNoJpegFileOfOtherColours) {
+    const TemporaryFolder folder;
+    Job job;
+    const auto copied = [&](const Bundle& bundle, bool copies) {
+        const auto path = folder.path() / "a.html";
+        EXPECT_TRUE(write(bundle, path, job, {"a.mp4", {}, {.copies = copies}, {}}));
+        return !readPage(path).json("scene0")["pages"][0].contains("colour");
+    };
+    EXPECT_TRUE(copied(fromJpeg(), true));
+    EXPECT_FALSE(copied(fromJpeg(), false)) << "nobody asked for it";
+    Bundle changed = fromJpeg();
+    changed.views[1].texture.rgba8()->at(4, 4).g ^= 1;
+    EXPECT_FALSE(copied(changed, true));
+    Bundle moved = fromJpeg();
+    moved.views[2].colourFile.x += 40;
+    EXPECT_FALSE(copied(moved, true));
+    // Browsers turn a picture as Exif says, which may be anything.
+    Bundle turned = fromJpeg();
+    Bytes bytes = *turned.views[0].colourFile.jpeg;
+    const unsigned char exif[] = {0xff, 0xe1, 0, 10, 'E', 'x', 'i', 'f', 0, 0, 0, 0};
+    const auto segment = std::as_bytes(std::span(exif));
+    bytes.insert(bytes.begin() + 2, segment.begin(), segment.end());
+    turned.views[0].colourFile.jpeg = std::make_shared<const Bytes>(std::move(bytes));
+    EXPECT_FALSE(copied(turned, true));
 }
 
 /// A view of planes at 2 and 4, and 7 in a corner, from a place with a turn.
@@ -322,7 +387,7 @@ TEST(ViewerPage, OfOneViewBeginsAtItsPoseAndTurnsALittle) {
     ASSERT_TRUE(atlas);
     ASSERT_TRUE(write(bundle, folder.path() / "a.html", job));
     expectOwnPose(readPage(folder.path() / "a.html").json("data")["start"], camera);
-    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "b.html", {"atlas", {}, {}}, job));
+    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "b.html", {"atlas", {}, {}, {}}, job));
     expectOwnPose(readPage(folder.path() / "b.html").json("data")["start"], camera);
     // What is behind it does not count as a second view.
     bundle.views.push_back(bundle.views[0]);
@@ -350,7 +415,7 @@ TEST(ViewerPage, SaysThatItLeavesTheEnvironmentOut) {
     auto notes = job.takeNotes();
     ASSERT_EQ(notes.size(), 1u);
     EXPECT_NE(notes[0].find("environment"), std::string::npos) << notes[0];
-    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "b.html", {"atlas", {}, {}}, job));
+    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "b.html", {"atlas", {}, {}, {}}, job));
     notes = job.takeNotes();
     ASSERT_EQ(notes.size(), 1u);
     EXPECT_NE(notes[0].find("environment"), std::string::npos) << notes[0];
