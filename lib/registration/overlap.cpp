@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx::registration {
@@ -15,35 +14,49 @@ constexpr float kEdge = 0.05f;
 /// against each).
 constexpr int kProbes = 24, kProbesOfMany = 10;
 constexpr int kMany = 64;
-/// Points looked up per view and axis to measure a pair.
-constexpr int kMeasured = 120;
 
-/// Calls visit(relative difference) for points of `from` on a grid that `to` sees, too; gives the
-/// number of grid points that are points of the object.
-template <class Visit>
-int lookUp(const ReferenceView& from, const ReferenceView& to, int perAxis, double tolerance,
-           Visit&& visit) {
+/// Whether two cameras look at the same side of a surface that passes pixel (x, y) of `from`.
+bool seeTheSameSide(const ReferenceView& from, int x, int y, const Camera& to) {
+    const auto here = sampleDepth(from.depth, x + 0.5, y + 0.5);
+    if (!here) return false;
+    const Camera& camera = from.camera;
+    const auto at = [&](double dx, double dy, double dist) {
+        return Pose(camera).worldFromCamera * camera.unproject(x + 0.5 + dx, y + 0.5 + dy, dist) +
+               camera.position;
+    };
+    const double dist = here->distance;
+    const glm::dvec3 point = at(0, 0, dist);
+    const glm::dvec3 normal = glm::cross(at(1, 0, dist + here->gradient.x) - point,
+                                         at(0, 1, dist + here->gradient.y) - point);
+    const auto side = [&](const Camera& c) {
+        return glm::dot(normal, c.orthographic ? -c.forward() : c.position - point);
+    };
+    return side(camera) * side(to) > 0;
+}
+
+}  // namespace
+
+CommonPoints commonPoints(const ReferenceView& from, const ReferenceView& to, int perAxis,
+                          double tolerance) {
+    CommonPoints out;
     const Pose target(to.camera);
     const int stepX = std::max(1, from.camera.width / perAxis);
     const int stepY = std::max(1, from.camera.height / perAxis);
-    int points = 0;
     for (int y = stepY / 2; y < from.camera.height; y += stepY) {
         for (int x = stepX / 2; x < from.camera.width; x += stepX) {
             if (!hasPoint(from.depth.at(x, y))) continue;
-            ++points;
+            ++out.asked;
             const glm::dvec3 inTarget = target.toCamera(from.worldPoint(x, y));
             if (!(inTarget.z < 0)) continue;
             const glm::dvec3 at = to.camera.project(inTarget);
             const auto there = sampleDepth(to.depth, at.x, at.y);
-            if (!there) continue;
-            const double difference = (at.z - there->distance) / at.z;
-            if (std::abs(difference) < tolerance) visit(difference);
+            if (!there || !(std::abs(at.z - there->distance) < tolerance * at.z)) continue;
+            if (!seeTheSameSide(from, x, y, to.camera)) continue;
+            out.points.push_back({from.depth.at(x, y), at.z, there->distance});
         }
     }
-    return points;
+    return out;
 }
-
-}  // namespace
 
 std::optional<DepthSample> sampleDepth(const Image<float>& depth, double x, double y) {
     const double left = std::floor(x - 0.5), top = std::floor(y - 0.5);
@@ -60,7 +73,7 @@ std::optional<DepthSample> sampleDepth(const Image<float>& depth, double x, doub
                        {(b - a) * (1 - v) + (d - c) * v, lower - upper}};
 }
 
-std::vector<Pair> overlappingPairs(const Bundle& bundle, const PoseRefinementSettings& settings) {
+std::vector<Pair> overlappingPairs(const Bundle& bundle, const OverlapSettings& settings) {
     const int count = static_cast<int>(bundle.views.size());
     std::vector<std::vector<Pair>> ofView(bundle.views.size());
     parallelFor(0, count, [&](std::int64_t i) {
@@ -68,11 +81,11 @@ std::vector<Pair> overlappingPairs(const Bundle& bundle, const PoseRefinementSet
         auto& pairs = ofView[static_cast<std::size_t>(i)];
         for (int j = 0; j < count; ++j) {
             if (j == i) continue;
-            int common = 0;
-            const int points = lookUp(from, bundle.views[static_cast<std::size_t>(j)],
-                                      count < kMany ? kProbes : kProbesOfMany,
-                                      settings.overlapTolerance, [&](double) { ++common; });
-            const double overlap = points > 0 ? static_cast<double>(common) / points : 0;
+            const ReferenceView& to = bundle.views[static_cast<std::size_t>(j)];
+            if (to.background != from.background) continue;
+            const double overlap = commonPoints(from, to, count < kMany ? kProbes : kProbesOfMany,
+                                                settings.overlapTolerance)
+                                       .overlap();
             if (overlap >= settings.minOverlap) pairs.push_back({static_cast<int>(i), j, overlap});
         }
         std::stable_sort(pairs.begin(), pairs.end(),
@@ -85,32 +98,4 @@ std::vector<Pair> overlappingPairs(const Bundle& bundle, const PoseRefinementSet
     return all;
 }
 
-DepthDisagreement disagreement(const Bundle& bundle, const std::vector<Pair>& pairs,
-                               const PoseRefinementSettings& settings) {
-    std::vector<double> medians(pairs.size());
-    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
-        const Pair& pair = pairs[static_cast<std::size_t>(i)];
-        std::vector<double> differences;
-        lookUp(bundle.views[static_cast<std::size_t>(pair.from)],
-               bundle.views[static_cast<std::size_t>(pair.to)], kMeasured,
-               settings.overlapTolerance, [&](double d) { differences.push_back(std::abs(d)); });
-        medians[static_cast<std::size_t>(i)] = medianOf(std::move(differences));
-    });
-    DepthDisagreement result;
-    result.pairs = static_cast<int>(pairs.size());
-    for (const Pair& pair : pairs) result.overlap += pair.overlap / result.pairs;
-    result.relative = medianOf(std::move(medians));
-    return result;
-}
-
 }  // namespace stx::registration
-
-namespace stx {
-
-DepthDisagreement measureDepthDisagreement(const Bundle& bundle,
-                                           const PoseRefinementSettings& settings) {
-    return registration::disagreement(bundle, registration::overlappingPairs(bundle, settings),
-                                      settings);
-}
-
-}  // namespace stx
