@@ -32,13 +32,13 @@ struct OfPair {
 };
 
 /// A pixel's width and half a step of the depth code, shares of the distance.
-glm::dvec2 finenessOf(const ReferenceView& view, double dist) {
+glm::dvec2 finenessOf(const ViewHeader& view, double dist) {
     const glm::dvec2 spacing = view.camera.sampleSpacing(dist);
     const double step = view.depthBits < 32 ? view.depthCode().step() : 0.0;
     return glm::dvec2(std::max(spacing.x, spacing.y), step / 2) / dist;
 }
 
-OfPair measured(const ReferenceView& from, const ReferenceView& to, double tolerance) {
+OfPair measured(const DepthView& from, const DepthView& to, double tolerance) {
     const CommonPoints common = commonPoints(from, to, kMeasured, tolerance);
     if (common.points.size() < kFewestPoints) return {};
     std::vector<double> apart, own, there;
@@ -49,8 +49,8 @@ OfPair measured(const ReferenceView& from, const ReferenceView& to, double toler
     }
     const auto quarter = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 4);
     std::nth_element(apart.begin(), quarter, apart.end());
-    const glm::dvec2 a = finenessOf(from, medianOf(std::move(own))),
-                     b = finenessOf(to, medianOf(std::move(there)));
+    const glm::dvec2 a = finenessOf(*from.header, medianOf(std::move(own))),
+                     b = finenessOf(*to.header, medianOf(std::move(there)));
     return {true, *quarter, std::max(kSameShare, kSameOfPixel * std::max(a.x, b.x)) + a.y + b.y};
 }
 
@@ -84,14 +84,14 @@ ViewDisagreement ofView(int view, const std::vector<Pair>& pairs,
 
 }  // namespace
 
-DepthDisagreement disagreement(const Bundle& bundle, const std::vector<Pair>& pairs,
+DepthDisagreement disagreement(std::span<const DepthView> views, const std::vector<Pair>& pairs,
                                const OverlapSettings& settings) {
     std::vector<OfPair> found(pairs.size());
     parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
         const Pair& pair = pairs[static_cast<std::size_t>(i)];
         found[static_cast<std::size_t>(i)] =
-            measured(bundle.views[static_cast<std::size_t>(pair.from)],
-                     bundle.views[static_cast<std::size_t>(pair.to)], settings.overlapTolerance);
+            measured(views[static_cast<std::size_t>(pair.from)],
+                     views[static_cast<std::size_t>(pair.to)], settings.overlapTolerance);
     });
     DepthDisagreement result;
     std::vector<double> values;
@@ -103,7 +103,7 @@ DepthDisagreement disagreement(const Bundle& bundle, const std::vector<Pair>& pa
     result.pairs = static_cast<int>(values.size());
     if (result.pairs > 0) result.overlap /= result.pairs;
     result.relative = medianOf(std::move(values));
-    for (std::size_t v = 0; v < bundle.views.size(); ++v)
+    for (std::size_t v = 0; v < views.size(); ++v)
         result.views.push_back(ofView(static_cast<int>(v), pairs, found));
     return result;
 }
@@ -114,9 +114,20 @@ bool DepthDisagreement::disagrees() const {
     return std::ranges::any_of(views, &ViewDisagreement::disagrees);
 }
 
-DepthDisagreement measureDepthDisagreement(const Bundle& bundle, const OverlapSettings& settings) {
-    return registration::disagreement(bundle, registration::overlappingPairs(bundle, settings),
+std::vector<DepthView> depthViewsOf(const Bundle& bundle) {
+    std::vector<DepthView> views;
+    for (const ReferenceView& view : bundle.views) views.push_back({&view, &view.depth});
+    return views;
+}
+
+DepthDisagreement measureDepthDisagreement(std::span<const DepthView> views,
+                                           const OverlapSettings& settings) {
+    return registration::disagreement(views, registration::overlappingPairs(views, settings),
                                       settings);
+}
+
+DepthDisagreement measureDepthDisagreement(const Bundle& bundle, const OverlapSettings& settings) {
+    return measureDepthDisagreement(depthViewsOf(bundle), settings);
 }
 
 std::optional<std::string> disagreementNote(const Bundle& bundle, const DepthDisagreement& found,

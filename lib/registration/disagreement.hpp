@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,13 @@
 /// cameras are not where their poses say, or because depth is off. A renderer then shows edges
 /// twice, or blurs what it blends.
 namespace stx {
+
+/// What is looked at of a view. The depth has the camera's size: scene units, kNoDepth = no point.
+struct DepthView {
+    const ViewHeader* header = nullptr;
+    const Image<float>* depth = nullptr;
+};
+[[nodiscard]] std::vector<DepthView> depthViewsOf(const Bundle& bundle);
 
 struct OverlapSettings {
     /// Two points are taken for the same surface when their distances differ by less than this
@@ -48,6 +56,8 @@ struct DepthDisagreement {
 /// Measures, changes nothing. Only surfaces count that both views see from the same side. Views
 /// without points overlap with none, and backgrounds, which are of other times, with each other
 /// only. The same on any number of threads.
+[[nodiscard]] DepthDisagreement measureDepthDisagreement(std::span<const DepthView> views,
+                                                         const OverlapSettings& settings = {});
 [[nodiscard]] DepthDisagreement measureDepthDisagreement(const Bundle& bundle,
                                                          const OverlapSettings& settings = {});
 

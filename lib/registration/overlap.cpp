@@ -16,10 +16,10 @@ constexpr int kProbes = 24, kProbesOfMany = 10;
 constexpr int kMany = 64;
 
 /// Whether two cameras look at the same side of a surface that passes pixel (x, y) of `from`.
-bool seeTheSameSide(const ReferenceView& from, int x, int y, const Camera& to) {
-    const auto here = sampleDepth(from.depth, x + 0.5, y + 0.5);
+bool seeTheSameSide(const DepthView& from, int x, int y, const Camera& to) {
+    const auto here = sampleDepth(*from.depth, x + 0.5, y + 0.5);
     if (!here) return false;
-    const Camera& camera = from.camera;
+    const Camera& camera = from.header->camera;
     const auto at = [&](double dx, double dy, double dist) {
         return Pose(camera).worldFromCamera * camera.unproject(x + 0.5 + dx, y + 0.5 + dy, dist) +
                camera.position;
@@ -36,23 +36,25 @@ bool seeTheSameSide(const ReferenceView& from, int x, int y, const Camera& to) {
 
 }  // namespace
 
-CommonPoints commonPoints(const ReferenceView& from, const ReferenceView& to, int perAxis,
+CommonPoints commonPoints(const DepthView& from, const DepthView& to, int perAxis,
                           double tolerance) {
     CommonPoints out;
-    const Pose target(to.camera);
-    const int stepX = std::max(1, from.camera.width / perAxis);
-    const int stepY = std::max(1, from.camera.height / perAxis);
-    for (int y = stepY / 2; y < from.camera.height; y += stepY) {
-        for (int x = stepX / 2; x < from.camera.width; x += stepX) {
-            if (!hasPoint(from.depth.at(x, y))) continue;
+    const Camera &own = from.header->camera, &other = to.header->camera;
+    const Pose source(own), target(other);
+    const int stepX = std::max(1, own.width / perAxis), stepY = std::max(1, own.height / perAxis);
+    for (int y = stepY / 2; y < own.height; y += stepY) {
+        for (int x = stepX / 2; x < own.width; x += stepX) {
+            const float dist = from.depth->at(x, y);
+            if (!hasPoint(dist)) continue;
             ++out.asked;
-            const glm::dvec3 inTarget = target.toCamera(from.worldPoint(x, y));
+            const glm::dvec3 inTarget = target.toCamera(
+                source.position + source.worldFromCamera * own.unproject(x + 0.5, y + 0.5, dist));
             if (!(inTarget.z < 0)) continue;
-            const glm::dvec3 at = to.camera.project(inTarget);
-            const auto there = sampleDepth(to.depth, at.x, at.y);
+            const glm::dvec3 at = other.project(inTarget);
+            const auto there = sampleDepth(*to.depth, at.x, at.y);
             if (!there || !(std::abs(at.z - there->distance) < tolerance * at.z)) continue;
-            if (!seeTheSameSide(from, x, y, to.camera)) continue;
-            out.points.push_back({from.depth.at(x, y), at.z, there->distance});
+            if (!seeTheSameSide(from, x, y, other)) continue;
+            out.points.push_back({dist, at.z, there->distance});
         }
     }
     return out;
@@ -73,16 +75,17 @@ std::optional<DepthSample> sampleDepth(const Image<float>& depth, double x, doub
                        {(b - a) * (1 - v) + (d - c) * v, lower - upper}};
 }
 
-std::vector<Pair> overlappingPairs(const Bundle& bundle, const OverlapSettings& settings) {
-    const int count = static_cast<int>(bundle.views.size());
-    std::vector<std::vector<Pair>> ofView(bundle.views.size());
+std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
+                                   const OverlapSettings& settings) {
+    const int count = static_cast<int>(views.size());
+    std::vector<std::vector<Pair>> ofView(views.size());
     parallelFor(0, count, [&](std::int64_t i) {
-        const ReferenceView& from = bundle.views[static_cast<std::size_t>(i)];
+        const DepthView& from = views[static_cast<std::size_t>(i)];
         auto& pairs = ofView[static_cast<std::size_t>(i)];
         for (int j = 0; j < count; ++j) {
             if (j == i) continue;
-            const ReferenceView& to = bundle.views[static_cast<std::size_t>(j)];
-            if (to.background != from.background) continue;
+            const DepthView& to = views[static_cast<std::size_t>(j)];
+            if (to.header->background != from.header->background) continue;
             const double overlap = commonPoints(from, to, count < kMany ? kProbes : kProbesOfMany,
                                                 settings.overlapTolerance)
                                        .overlap();

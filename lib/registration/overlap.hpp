@@ -40,8 +40,8 @@ struct CommonPoints {
 };
 /// `perAxis`: about so many pixels of `from` along either side. Points that are apart by a larger
 /// share than `tolerance`, or that are seen from the other side, are not the same.
-[[nodiscard]] CommonPoints commonPoints(const ReferenceView& from, const ReferenceView& to,
-                                        int perAxis, double tolerance);
+[[nodiscard]] CommonPoints commonPoints(const DepthView& from, const DepthView& to, int perAxis,
+                                        double tolerance);
 
 /// A view's camera, ready to be applied to many points.
 struct Pose {
@@ -55,11 +55,12 @@ struct Pose {
 };
 
 /// Pairs of overlapping views, both directions, in order of `from`, the widest overlaps first.
-[[nodiscard]] std::vector<Pair> overlappingPairs(const Bundle& bundle,
+[[nodiscard]] std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
                                                  const OverlapSettings& settings);
 
 /// What the pairs and their views disagree by.
-[[nodiscard]] DepthDisagreement disagreement(const Bundle& bundle, const std::vector<Pair>& pairs,
+[[nodiscard]] DepthDisagreement disagreement(std::span<const DepthView> views,
+                                             const std::vector<Pair>& pairs,
                                              const OverlapSettings& settings);
 
 }  // namespace stx::registration
