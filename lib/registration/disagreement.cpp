@@ -16,7 +16,7 @@ namespace registration {
 namespace {
 
 /// Points looked up per view and axis to measure a pair, and the fewest that tell.
-constexpr int kMeasured = 120;
+constexpr int kMeasured = 80;
 constexpr std::size_t kFewestPoints = 30;
 /// What counts as one surface when views are drawn, a share of the distance (kSame of
 /// shaders/shared/surface_constants.glsl, kSameDepth of lib/render/splat), or of a pixel's width if
@@ -75,7 +75,7 @@ ViewDisagreement ofView(int view, const std::vector<Pair>& pairs,
     if (values.empty()) return out;
     out.partners = static_cast<int>(partners.size());
     out.overlap /= static_cast<double>(values.size());
-    // Of three views that one is wrong among, the other two have one good partner each.
+    // Of three views one of which is off, the other two have one good partner each.
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
     std::nth_element(values.begin(), middle, values.end());
     out.relative = *middle;

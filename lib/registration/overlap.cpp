@@ -15,23 +15,29 @@ constexpr float kEdge = 0.05f;
 constexpr int kProbes = 24, kProbesOfMany = 10;
 constexpr int kMany = 64;
 
-/// Whether two cameras look at the same side of a surface that passes pixel (x, y) of `from`.
-bool seeTheSameSide(const DepthView& from, int x, int y, const Camera& to) {
-    const auto here = sampleDepth(*from.depth, x + 0.5, y + 0.5);
+/// Where a camera is, for another one: a place there, w being 1, or the direction towards an
+/// orthographic one, w being 0.
+glm::dvec4 eyeIn(const Pose& frame, const Camera& camera) {
+    if (camera.orthographic) return {-camera.forward() * frame.worldFromCamera, 0};
+    return {frame.toCamera(camera.position), 1};
+}
+
+/// Whether two eyes, in the space of a view's camera, look at the same side of the surface that
+/// passes pixel (x, y) of it.
+bool seeTheSameSide(const DepthView& view, int x, int y, const glm::dvec4& own,
+                    const glm::dvec4& other) {
+    const auto here = sampleDepth(*view.depth, x + 0.5, y + 0.5);
     if (!here) return false;
-    const Camera& camera = from.header->camera;
-    const auto at = [&](double dx, double dy, double dist) {
-        return Pose(camera).worldFromCamera * camera.unproject(x + 0.5 + dx, y + 0.5 + dy, dist) +
-               camera.position;
+    const auto at = [&](double dx, double dy, double more) {
+        return view.header->camera.unproject(x + 0.5 + dx, y + 0.5 + dy, here->distance + more);
     };
-    const double dist = here->distance;
-    const glm::dvec3 point = at(0, 0, dist);
-    const glm::dvec3 normal = glm::cross(at(1, 0, dist + here->gradient.x) - point,
-                                         at(0, 1, dist + here->gradient.y) - point);
-    const auto side = [&](const Camera& c) {
-        return glm::dot(normal, c.orthographic ? -c.forward() : c.position - point);
+    const glm::dvec3 point = at(0, 0, 0);
+    const glm::dvec3 normal =
+        glm::cross(at(1, 0, here->gradient.x) - point, at(0, 1, here->gradient.y) - point);
+    const auto side = [&](const glm::dvec4& eye) {
+        return glm::dot(normal, glm::dvec3(eye) - eye.w * point);
     };
-    return side(camera) * side(to) > 0;
+    return side(own) * side(other) > 0;
 }
 
 }  // namespace
@@ -41,6 +47,7 @@ CommonPoints commonPoints(const DepthView& from, const DepthView& to, int perAxi
     CommonPoints out;
     const Camera &own = from.header->camera, &other = to.header->camera;
     const Pose source(own), target(other);
+    const glm::dvec4 ownEye = eyeIn(source, own), otherEye = eyeIn(source, other);
     const int stepX = std::max(1, own.width / perAxis), stepY = std::max(1, own.height / perAxis);
     for (int y = stepY / 2; y < own.height; y += stepY) {
         for (int x = stepX / 2; x < own.width; x += stepX) {
@@ -53,7 +60,7 @@ CommonPoints commonPoints(const DepthView& from, const DepthView& to, int perAxi
             const glm::dvec3 at = other.project(inTarget);
             const auto there = sampleDepth(*to.depth, at.x, at.y);
             if (!there || !(std::abs(at.z - there->distance) < tolerance * at.z)) continue;
-            if (!seeTheSameSide(from, x, y, other)) continue;
+            if (!seeTheSameSide(from, x, y, ownEye, otherEye)) continue;
             out.points.push_back({dist, at.z, there->distance});
         }
     }
