@@ -96,11 +96,15 @@ void addInfo(CommandLine& line, Program& program) {
                          "What is in a file: container, nodes, views, cameras, bytes\n\n"
                          "  stx info model.mp4\n"
                          "  stx info model.exr --format json --bounds\n"
+                         "  stx info capture.exr --agreement\n"
                          "  stx info model.mp4 --cameras cameras.svg");
     auto o = std::make_shared<InfoCommandOptions>();
     c.option("FILE", o->input, "Bundle, atlas, mesh or image set").required();
     c.flag("--bounds", o->info.bounds,
            "Compute the bounds and point counts from the pixels where the file does not hold them");
+    c.flag("--agreement", o->info.agreement,
+           "Compare the views: by how much each differs in depth from those that overlap it, as a "
+           "table; a note names views that are off, by their cameras or their depth");
     c.option("--cameras", o->plot,
              "Draw the cameras around the object, from above and from the side, as an SVG picture")
         .takes("FILE.svg");

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -7,6 +8,8 @@
 #include "formats/any/sequences.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/stopwatch.hpp"
+#include "lib/refine/poses.hpp"
+#include "lib/registration/disagreement.hpp"
 #include "tools/commands.hpp"
 #include "tools/refining.hpp"
 
@@ -66,13 +69,20 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
             "'{}' moves, and the step 'poses' moves the cameras of one moment; leave it out",
             o.input);
     std::size_t views = 0;
-    bool before = false;
+    bool before = false, first = true;
     frames =
         changedOnTheWay(std::move(frames), o.output, [&](Bundle& bundle, Job& job) -> Result<void> {
             for (const ReferenceView& view : bundle.views)
                 before = before || !view.refined.steps.empty();
             views = bundle.views.size();
-            return refining.refine(bundle, job);
+            STX_CHECK(refining.refine(bundle, job));
+            // Of a film its first frame tells.
+            if (!std::exchange(first, false)) return {};
+            const bool aligned = settings.on(RefineStep::poses) || posesWereAligned(bundle);
+            if (const auto note =
+                    disagreementNote(bundle, measureDepthDisagreement(bundle), aligned))
+                job.note("after refining, " + *note);
+            return {};
         });
     SaveOptions save;
     save.noClobber = program.common.noClobber;

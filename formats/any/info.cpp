@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "formats/any/info_agreement.hpp"
 #include "formats/any/info_photo.hpp"
 #include "formats/any/open.hpp"
 #include "formats/any/sequences.hpp"
@@ -412,6 +413,11 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
             STX_CHECK(describeAtlas(path, options.object, out, job));
             break;
         case FileKind::mesh: {
+            if (options.agreement)
+                return fail(ErrorCode::usage,
+                            "'{}' is a mesh, which has no views that could agree; leave out "
+                            "--agreement",
+                            path.string());
             STX_TRY(const auto mesh, readMesh(path, job));
             out["container"] = "mesh";
             out["triangles"] = mesh.triangles.size();
@@ -441,9 +447,13 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
                         "with depth",
                         path.string());
     }
-    if (options.bounds && (!out.contains("bounds") || !out.contains("points"))) {
+    const bool bounds = options.bounds && (!out.contains("bounds") || !out.contains("points"));
+    if (bounds || options.agreement) {
         STX_TRY(const auto bundle, openBundle(path, open, job));
-        addFromPixels(out, bundle);
+        if (bounds) addFromPixels(out, bundle);
+        // An import names views that are off by itself.
+        if (options.agreement)
+            out["agreement"] = agreementJson(bundle, out["container"] != "imageset", job);
     }
     return out;
 }
@@ -560,6 +570,7 @@ std::string describeAsText(const Json& info) {
                 "{} '{}': {} bytes{}\n", text(s["kind"]), text(s["name"]), text(s["bytes"]),
                 s.contains("time") ? fmt::format(", from {:g} s on", s["time"].get<double>()) : "");
     }
+    if (info.contains("agreement")) out += agreementText(info["agreement"]);
     return out;
 }
 

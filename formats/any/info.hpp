@@ -12,11 +12,15 @@ namespace stx {
 struct InfoOptions {
     /// Decode the pixels where the headers do not have the bounds or the points.
     bool bounds = false;
+    /// Decode the pixels and measure by how much each view disagrees with those that overlap it; a
+    /// note names those that do.
+    bool agreement = false;
     std::string object;  ///< as OpenOptions::object; empty: of all
 };
 
 /// What is in a file, as JSON by tools/schemas/info.schema.json: container, node kind, cameras,
-/// sizes, bytes. Reads headers only, unless options.bounds asks for more. Errors: io, invalidInput.
+/// sizes, bytes. Reads headers only, unless options.bounds or
+/// options.agreement asks for more. Errors: io, invalidInput.
 [[nodiscard]] Result<nlohmann::ordered_json> describe(const std::filesystem::path& path,
                                                       const InfoOptions& options, Job& job);
 

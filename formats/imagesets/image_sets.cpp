@@ -16,7 +16,7 @@
 #include "lib/model/sequence.hpp"
 #include "lib/model/srgb8.hpp"
 #include "lib/refine/poses.hpp"
-#include "lib/registration/refine_poses.hpp"
+#include "lib/registration/disagreement.hpp"
 
 namespace stx {
 namespace {
@@ -90,23 +90,15 @@ void makeNamesUnique(std::vector<ReferenceView>& views) {
     }
 }
 
-/// A disagreement in depth worth a word, as a share of the distance: above what the depth of a
-/// sensor or 8 bits leave, below what shows as double edges.
-constexpr double kPosesDisagree = 0.005;
-
-/// Refines the poses, or says that they want it.
-Result<void> attendToPoses(Bundle& bundle, const SetDescription& set,
-                           const ImageSetOptions& options, RefineReport& report, Job& job) {
-    if (options.refine.atImport(RefineStep::poses, false)) {
+/// Refines the poses where that is asked for, and says which views disagree.
+Result<void> attendToPoses(Bundle& bundle, const ImageSetOptions& options, RefineReport& report,
+                           Job& job) {
+    const bool refines = options.refine.atImport(RefineStep::poses, false);
+    if (refines) {
         STX_TRY(report.of(RefineStep::poses), alignPoses(bundle, job));
-    } else if (std::ranges::any_of(set.views, &SetView::sensor)) {
-        const DepthDisagreement found = measureDepthDisagreement(bundle);
-        if (found.relative > kPosesDisagree)
-            job.note(fmt::format(
-                "overlapping views disagree by {:.2g} % of the distance (median): edges may show "
-                "twice; --refine-poses aligns them",
-                100 * found.relative));
     }
+    if (const auto note = disagreementNote(bundle, measureDepthDisagreement(bundle), refines))
+        job.note(*note);
     return {};
 }
 
@@ -253,7 +245,7 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
     findOrigin(bundle, set, job);
     RefineReport report;
     for (const RefineReport& ofView : reports) report.add(ofView);
-    STX_CHECK(attendToPoses(bundle, set, options, report, job));
+    STX_CHECK(attendToPoses(bundle, options, report, job));
     if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));
     if (options.refined) options.refined(report);
     return bundle;

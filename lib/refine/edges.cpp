@@ -375,14 +375,6 @@ bool edgesAreFat(float colour) {
     return colour < kFat;
 }
 
-std::optional<float> disagreementOf(std::span<const EdgeView> views) {
-    std::vector<const Image<float>*> q;
-    for (const EdgeView& view : views) q.push_back(view.q);
-    auto apart = pointsApart(views, q);
-    if (apart.empty()) return {};
-    return lowerQuartile(apart);
-}
-
 int thinFatEdges(std::span<const EdgeView> views) {
     int round = 0;
     for (; round < kMostRounds && edgesAreFat(colourAtEdges(views)) && !othersShowTheFront(views);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -29,11 +28,6 @@ struct EdgeView {
 
 /// Whether that says that surfaces reach over their edges.
 [[nodiscard]] bool edgesAreFat(float colour);
-
-/// How far apart views are where they show the same surface, a share of q: what a quarter of the
-/// points are not above, since among leaves most points of two views are of two surfaces. Nothing
-/// where hardly any are near each other.
-[[nodiscard]] std::optional<float> disagreementOf(std::span<const EdgeView> views);
 
 /// Takes a pixel off the surfaces in front, where stereo and filters of depth let them grow over
 /// what is behind, as long as edgesAreFat() and no other views deny it: of thin bars and fine

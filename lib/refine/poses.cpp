@@ -1,5 +1,6 @@
 #include "lib/refine/poses.hpp"
 
+#include <algorithm>
 #include <vector>
 
 #include <fmt/format.h>
@@ -35,6 +36,12 @@ Result<RefineStepReport> alignPoses(Bundle& bundle, Job& job) {
         done.maxShift, glm::degrees(done.maxTurn), 100 * done.before.relative,
         100 * done.after.relative));
     return report;
+}
+
+bool posesWereAligned(const Bundle& bundle) {
+    return std::ranges::any_of(bundle.views, [](const ReferenceView& view) {
+        return wasDone(RefineStep::poses, view.refined);
+    });
 }
 
 }  // namespace stx

@@ -11,4 +11,7 @@ namespace stx {
 /// report counts the views whose camera moved. Errors: cancelled.
 [[nodiscard]] Result<RefineStepReport> alignPoses(Bundle& bundle, Job& job);
 
+/// Whether that moved cameras of a bundle before.
+[[nodiscard]] bool posesWereAligned(const Bundle& bundle);
+
 }  // namespace stx

@@ -19,6 +19,7 @@
 #include "lib/refine/pinholes.hpp"
 #include "lib/refine/silhouettes.hpp"
 #include "lib/refine/strays.hpp"
+#include "lib/registration/disagreement.hpp"
 
 namespace stx {
 namespace {
@@ -200,6 +201,17 @@ std::optional<Image<float>> depthOf(const RefineView& view, const Work& w) {
     return out;
 }
 
+/// How far views are apart as they are by now, a share of the distance.
+float disagreementOf(std::span<const RefineView> views, std::span<const Work> works) {
+    std::vector<std::optional<Image<float>>> changed(views.size());
+    std::vector<DepthView> now;
+    for (std::size_t k = 0; k < views.size(); ++k) {
+        changed[k] = depthOf(views[k], works[k]);
+        now.push_back({views[k].header, changed[k] ? &*changed[k] : views[k].depth});
+    }
+    return static_cast<float>(measureDepthDisagreement(now).relative);
+}
+
 }  // namespace
 
 void RefinedView::giveTo(ViewHeader& view) const {
@@ -296,7 +308,7 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> given,
     if (!grainy && settings.on(RefineStep::agree) && views.size() > 1 &&
         std::ranges::all_of(views, isCaptured)) {
         const Clock clock(report.of(RefineStep::agree));
-        const float doubt = kDoubtOfDisagreement * disagreementOf(edges).value_or(0.0f);
+        const float doubt = kDoubtOfDisagreement * disagreementOf(views, works);
         for (std::size_t k = 0; k < views.size(); ++k)
             if (isNoisy(doubt, works[k].space.axis)) doubtAlike(noisyViews[k], works[k], doubt);
     }

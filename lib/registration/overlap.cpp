@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx::registration {
@@ -15,35 +14,58 @@ constexpr float kEdge = 0.05f;
 /// against each).
 constexpr int kProbes = 24, kProbesOfMany = 10;
 constexpr int kMany = 64;
-/// Points looked up per view and axis to measure a pair.
-constexpr int kMeasured = 120;
 
-/// Calls visit(relative difference) for points of `from` on a grid that `to` sees, too; gives the
-/// number of grid points that are points of the object.
-template <class Visit>
-int lookUp(const ReferenceView& from, const ReferenceView& to, int perAxis, double tolerance,
-           Visit&& visit) {
-    const Pose target(to.camera);
-    const int stepX = std::max(1, from.camera.width / perAxis);
-    const int stepY = std::max(1, from.camera.height / perAxis);
-    int points = 0;
-    for (int y = stepY / 2; y < from.camera.height; y += stepY) {
-        for (int x = stepX / 2; x < from.camera.width; x += stepX) {
-            if (!hasPoint(from.depth.at(x, y))) continue;
-            ++points;
-            const glm::dvec3 inTarget = target.toCamera(from.worldPoint(x, y));
-            if (!(inTarget.z < 0)) continue;
-            const glm::dvec3 at = to.camera.project(inTarget);
-            const auto there = sampleDepth(to.depth, at.x, at.y);
-            if (!there) continue;
-            const double difference = (at.z - there->distance) / at.z;
-            if (std::abs(difference) < tolerance) visit(difference);
-        }
-    }
-    return points;
+/// Where a camera is, for another one: a place there, w being 1, or the direction towards an
+/// orthographic one, w being 0.
+glm::dvec4 eyeIn(const Pose& frame, const Camera& camera) {
+    if (camera.orthographic) return {-camera.forward() * frame.worldFromCamera, 0};
+    return {frame.toCamera(camera.position), 1};
+}
+
+/// Whether two eyes, in the space of a view's camera, look at the same side of the surface that
+/// passes pixel (x, y) of it.
+bool seeTheSameSide(const DepthView& view, int x, int y, const glm::dvec4& own,
+                    const glm::dvec4& other) {
+    const auto here = sampleDepth(*view.depth, x + 0.5, y + 0.5);
+    if (!here) return false;
+    const auto at = [&](double dx, double dy, double more) {
+        return view.header->camera.unproject(x + 0.5 + dx, y + 0.5 + dy, here->distance + more);
+    };
+    const glm::dvec3 point = at(0, 0, 0);
+    const glm::dvec3 normal =
+        glm::cross(at(1, 0, here->gradient.x) - point, at(0, 1, here->gradient.y) - point);
+    const auto side = [&](const glm::dvec4& eye) {
+        return glm::dot(normal, glm::dvec3(eye) - eye.w * point);
+    };
+    return side(own) * side(other) > 0;
 }
 
 }  // namespace
+
+CommonPoints commonPoints(const DepthView& from, const DepthView& to, int perAxis,
+                          double tolerance) {
+    CommonPoints out;
+    const Camera &own = from.header->camera, &other = to.header->camera;
+    const Pose source(own), target(other);
+    const glm::dvec4 ownEye = eyeIn(source, own), otherEye = eyeIn(source, other);
+    const int stepX = std::max(1, own.width / perAxis), stepY = std::max(1, own.height / perAxis);
+    for (int y = stepY / 2; y < own.height; y += stepY) {
+        for (int x = stepX / 2; x < own.width; x += stepX) {
+            const float dist = from.depth->at(x, y);
+            if (!hasPoint(dist)) continue;
+            ++out.asked;
+            const glm::dvec3 inTarget = target.toCamera(
+                source.position + source.worldFromCamera * own.unproject(x + 0.5, y + 0.5, dist));
+            if (!(inTarget.z < 0)) continue;
+            const glm::dvec3 at = other.project(inTarget);
+            const auto there = sampleDepth(*to.depth, at.x, at.y);
+            if (!there || !(std::abs(at.z - there->distance) < tolerance * at.z)) continue;
+            if (!seeTheSameSide(from, x, y, ownEye, otherEye)) continue;
+            out.points.push_back({dist, at.z, there->distance});
+        }
+    }
+    return out;
+}
 
 std::optional<DepthSample> sampleDepth(const Image<float>& depth, double x, double y) {
     const double left = std::floor(x - 0.5), top = std::floor(y - 0.5);
@@ -60,19 +82,20 @@ std::optional<DepthSample> sampleDepth(const Image<float>& depth, double x, doub
                        {(b - a) * (1 - v) + (d - c) * v, lower - upper}};
 }
 
-std::vector<Pair> overlappingPairs(const Bundle& bundle, const PoseRefinementSettings& settings) {
-    const int count = static_cast<int>(bundle.views.size());
-    std::vector<std::vector<Pair>> ofView(bundle.views.size());
+std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
+                                   const OverlapSettings& settings) {
+    const int count = static_cast<int>(views.size());
+    std::vector<std::vector<Pair>> ofView(views.size());
     parallelFor(0, count, [&](std::int64_t i) {
-        const ReferenceView& from = bundle.views[static_cast<std::size_t>(i)];
+        const DepthView& from = views[static_cast<std::size_t>(i)];
         auto& pairs = ofView[static_cast<std::size_t>(i)];
         for (int j = 0; j < count; ++j) {
             if (j == i) continue;
-            int common = 0;
-            const int points = lookUp(from, bundle.views[static_cast<std::size_t>(j)],
-                                      count < kMany ? kProbes : kProbesOfMany,
-                                      settings.overlapTolerance, [&](double) { ++common; });
-            const double overlap = points > 0 ? static_cast<double>(common) / points : 0;
+            const DepthView& to = views[static_cast<std::size_t>(j)];
+            if (to.header->background != from.header->background) continue;
+            const double overlap = commonPoints(from, to, count < kMany ? kProbes : kProbesOfMany,
+                                                settings.overlapTolerance)
+                                       .overlap();
             if (overlap >= settings.minOverlap) pairs.push_back({static_cast<int>(i), j, overlap});
         }
         std::stable_sort(pairs.begin(), pairs.end(),
@@ -85,32 +108,4 @@ std::vector<Pair> overlappingPairs(const Bundle& bundle, const PoseRefinementSet
     return all;
 }
 
-DepthDisagreement disagreement(const Bundle& bundle, const std::vector<Pair>& pairs,
-                               const PoseRefinementSettings& settings) {
-    std::vector<double> medians(pairs.size());
-    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
-        const Pair& pair = pairs[static_cast<std::size_t>(i)];
-        std::vector<double> differences;
-        lookUp(bundle.views[static_cast<std::size_t>(pair.from)],
-               bundle.views[static_cast<std::size_t>(pair.to)], kMeasured,
-               settings.overlapTolerance, [&](double d) { differences.push_back(std::abs(d)); });
-        medians[static_cast<std::size_t>(i)] = medianOf(std::move(differences));
-    });
-    DepthDisagreement result;
-    result.pairs = static_cast<int>(pairs.size());
-    for (const Pair& pair : pairs) result.overlap += pair.overlap / result.pairs;
-    result.relative = medianOf(std::move(medians));
-    return result;
-}
-
 }  // namespace stx::registration
-
-namespace stx {
-
-DepthDisagreement measureDepthDisagreement(const Bundle& bundle,
-                                           const PoseRefinementSettings& settings) {
-    return registration::disagreement(bundle, registration::overlappingPairs(bundle, settings),
-                                      settings);
-}
-
-}  // namespace stx

@@ -5,7 +5,7 @@
 
 #include <glm/glm.hpp>
 
-#include "lib/registration/refine_poses.hpp"
+#include "lib/registration/disagreement.hpp"
 
 namespace stx::registration {
 
@@ -24,6 +24,25 @@ struct DepthSample {
 };
 [[nodiscard]] std::optional<DepthSample> sampleDepth(const Image<float>& depth, double x, double y);
 
+/// What two views both show, on a grid of pixels of the first.
+struct CommonPoints {
+    struct Point {
+        double own;    ///< its distance from the view it is of
+        double at;     ///< from the other one
+        double shown;  ///< what the other one shows there
+    };
+    int asked = 0;  ///< pixels of the grid that have a point
+    std::vector<Point> points;
+
+    [[nodiscard]] double overlap() const {
+        return asked > 0 ? static_cast<double>(points.size()) / asked : 0;
+    }
+};
+/// `perAxis`: about so many pixels of `from` along either side. Points that are apart by a larger
+/// share than `tolerance`, or that are seen from the other side, are not the same.
+[[nodiscard]] CommonPoints commonPoints(const DepthView& from, const DepthView& to, int perAxis,
+                                        double tolerance);
+
 /// A view's camera, ready to be applied to many points.
 struct Pose {
     glm::dmat3 worldFromCamera;
@@ -36,11 +55,12 @@ struct Pose {
 };
 
 /// Pairs of overlapping views, both directions, in order of `from`, the widest overlaps first.
-[[nodiscard]] std::vector<Pair> overlappingPairs(const Bundle& bundle,
-                                                 const PoseRefinementSettings& settings);
+[[nodiscard]] std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
+                                                 const OverlapSettings& settings);
 
-/// Median of the relative differences in depth, over the pairs.
-[[nodiscard]] DepthDisagreement disagreement(const Bundle& bundle, const std::vector<Pair>& pairs,
-                                             const PoseRefinementSettings& settings);
+/// What the pairs and their views disagree by.
+[[nodiscard]] DepthDisagreement disagreement(std::span<const DepthView> views,
+                                             const std::vector<Pair>& pairs,
+                                             const OverlapSettings& settings);
 
 }  // namespace stx::registration

@@ -177,9 +177,10 @@ double step(Bundle& bundle, const std::vector<Pyramid>& greys, const std::vector
 Result<PoseRefinement> refinePoses(Bundle& bundle, const PoseRefinementSettings& settings,
                                    Job& job) {
     PoseRefinement result;
-    const auto pairs = overlappingPairs(bundle, settings);
-    result.before = result.after = disagreement(bundle, pairs, settings);
-    if (pairs.empty()) return result;
+    const auto views = depthViewsOf(bundle);
+    const auto pairs = overlappingPairs(views, settings);
+    result.before = result.after = disagreement(views, pairs, settings);
+    if (result.before.pairs == 0) return result;
 
     std::vector<Camera> given;
     for (const ReferenceView& view : bundle.views) given.push_back(view.camera);
@@ -198,7 +199,7 @@ Result<PoseRefinement> refinePoses(Bundle& bundle, const PoseRefinementSettings&
                 break;
         }
     }
-    result.after = disagreement(bundle, pairs, settings);
+    result.after = disagreement(views, pairs, settings);
     // Colours that do not fit the depth can draw the poses away from where the depth agrees.
     result.kept = !(result.after.relative > result.before.relative);
     if (!result.kept) {

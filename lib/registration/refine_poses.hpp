@@ -1,31 +1,16 @@
 #pragma once
 
-#include <vector>
-
 #include "lib/base/job.hpp"
-#include "lib/model/bundle.hpp"
+#include "lib/registration/disagreement.hpp"
 
 /// Registration: making views that overlap agree on where the surface is. Trackers, hand-measured
 /// rigs and files whose poses belong to the frame before or after leave errors of a degree or a
 /// centimetre; a renderer then shows everything twice.
 namespace stx {
 
-struct PoseRefinementSettings {
-    /// Two points are taken for the same surface when their distances differ by less than this
-    /// share at the start. The error of the poses must stay below it.
-    double overlapTolerance = 0.1;
-    /// Pairs with a smaller overlap, as a share of either image, are left out.
-    double minOverlap = 0.05;
-    /// Each view is compared with this many others at most, those it overlaps most with.
-    int neighbours = 8;
+/// The error of the poses must stay below the tolerance.
+struct PoseRefinementSettings : OverlapSettings {
     int iterations = 20;  ///< at each of three resolutions, at most
-};
-
-/// How far overlapping views disagree about the distance of what both see.
-struct DepthDisagreement {
-    int pairs = 0;        ///< that overlap
-    double overlap = 0;   ///< share of an image that its partner sees, mean over the pairs
-    double relative = 0;  ///< median of |difference| / distance, over the pairs
 };
 
 struct PoseRefinement {
@@ -35,10 +20,6 @@ struct PoseRefinement {
     double maxShift = 0;  ///< of a viewpoint, scene units
     double maxTurn = 0;   ///< of an orientation, radians
 };
-
-/// Measures, changes nothing. Views without points overlap with none.
-[[nodiscard]] DepthDisagreement measureDepthDisagreement(
-    const Bundle& bundle, const PoseRefinementSettings& settings = {});
 
 /// Moves the cameras so that overlapping views agree in depth and colour: Gauss-Newton over all
 /// poses together on both differences, from coarse to fine, robust against what only one view sees

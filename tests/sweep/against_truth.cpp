@@ -1,5 +1,8 @@
+#include <algorithm>
+
 #include <fmt/format.h>
 
+#include "lib/registration/disagreement.hpp"
 #include "lib/render/surface/prepare/source.hpp"
 #include "tests/noisy_depth.hpp"
 #include "tests/sweep/measures.hpp"
@@ -73,6 +76,14 @@ Outcome exactDepthIsRepaired(Pictures& pictures) {
     report.of(RefineStep::exposure) = light;
     const bool same = refined.exactDepth() && !report.changed();
     return Measure{same ? 0.0 : 1.0, report.text()};
+}
+
+Outcome exactViewsDisagree(Pictures& pictures) {
+    const Bundle& bundle = pictures.captured().bundle;
+    const DepthDisagreement found = measureDepthDisagreement(bundle);
+    const auto off = std::ranges::count_if(found.views, &ViewDisagreement::disagrees);
+    return Measure{static_cast<double>(off),
+                   disagreementNote(bundle, found, false).value_or("all agree")};
 }
 
 Outcome surfaceBelowSplats(Pictures& pictures) {

@@ -15,6 +15,7 @@ Outcome betterQualityIsWorse(Pictures& pictures);
 Outcome surfaceBelowSplats(Pictures& pictures);
 Outcome noisySurfaceBelowSplats(Pictures& pictures);
 Outcome exactDepthIsRepaired(Pictures& pictures);
+Outcome exactViewsDisagree(Pictures& pictures);
 
 // same_scene.cpp: the same scene, asked in another way.
 Outcome crop(Pictures& pictures);

@@ -1,0 +1,65 @@
+#include "formats/any/info_agreement.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "lib/base/printable.hpp"
+#include "lib/refine/poses.hpp"
+#include "lib/registration/disagreement.hpp"
+
+namespace stx {
+namespace {
+
+std::string percentOf(const nlohmann::ordered_json& share) {
+    return fmt::format("{:.2f} %", 100 * share.get<double>());
+}
+
+std::string quotedName(const nlohmann::ordered_json& name) {
+    return "'" + printable(name.get_ref<const std::string&>()) + "'";
+}
+
+}  // namespace
+
+nlohmann::ordered_json agreementJson(const Bundle& bundle, bool notes, Job& job) {
+    const DepthDisagreement found = measureDepthDisagreement(bundle);
+    auto out = nlohmann::ordered_json::array();
+    for (std::size_t v = 0; v < bundle.views.size(); ++v) {
+        const ViewDisagreement& of = found.views[v];
+        out.push_back({{"view", bundle.views[v].name}, {"partners", of.partners}});
+        if (of.partners == 0) continue;
+        auto& view = out.back();
+        view["overlap"] = of.overlap;
+        view["disagreement"] = of.relative;
+        view["oneSurface"] = of.oneSurface;
+        view["disagrees"] = of.disagrees();
+        view["most"] = {{"view", bundle.views[static_cast<std::size_t>(of.farthest)].name},
+                        {"disagreement", of.farthestBy}};
+    }
+    if (const auto note = disagreementNote(bundle, found, posesWereAligned(bundle)); note && notes)
+        job.note(*note);
+    return out;
+}
+
+std::string agreementText(const nlohmann::ordered_json& agreement) {
+    std::size_t width = 4;
+    for (const auto& view : agreement) width = std::max(width, quotedName(view["view"]).size());
+    std::string out = fmt::format(
+        "agreement: by what share of the distance views differ from those that overlap them; ! is "
+        "more than one surface\n{:<{}}  views  overlap   differs  one surface  most from\n",
+        "view", width);
+    for (const auto& view : agreement) {
+        out += fmt::format("{:<{}}  {:>5}", quotedName(view["view"]), width,
+                           view["partners"].get<int>());
+        if (view.contains("most"))
+            out += fmt::format("  {:>5.0f} %  {:>7}{}  {:>11}  {} {}",
+                               100 * view["overlap"].get<double>(), percentOf(view["disagreement"]),
+                               view["disagrees"].get<bool>() ? '!' : ' ',
+                               percentOf(view["oneSurface"]), quotedName(view["most"]["view"]),
+                               percentOf(view["most"]["disagreement"]));
+        out += "\n";
+    }
+    return out;
+}
+
+}  // namespace stx

@@ -1,0 +1,162 @@
+#include "lib/registration/disagreement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "lib/base/counted.hpp"
+#include "lib/base/median.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/registration/overlap.hpp"
+
+namespace stx {
+namespace registration {
+namespace {
+
+/// Points looked up per view and axis to measure a pair, and the fewest that tell.
+constexpr int kMeasured = 80;
+constexpr std::size_t kFewestPoints = 30;
+/// What counts as one surface when views are drawn, a share of the distance (kSame of
+/// shaders/shared/surface_constants.glsl, kSameDepth of lib/render/splat), or of a pixel's width if
+/// that is more. Exact cases of tests/sweep come to 0.03 of that width. With one camera moved
+/// sideways by 2 % of the distance, 16 of 24 come to more than 0.25, 4 to less, and in 4 no views
+/// overlap.
+constexpr double kSameShare = 0.002, kSameOfPixel = 0.25;
+
+/// What a pair disagrees by.
+struct OfPair {
+    bool told = false;
+    double relative = 0, oneSurface = 0;  ///< as in ViewDisagreement
+};
+
+/// A pixel's width and half a step of the depth code, shares of the distance.
+glm::dvec2 finenessOf(const ViewHeader& view, double dist) {
+    const glm::dvec2 spacing = view.camera.sampleSpacing(dist);
+    const double step = view.depthBits < 32 ? view.depthCode().step() : 0.0;
+    return glm::dvec2(std::max(spacing.x, spacing.y), step / 2) / dist;
+}
+
+OfPair measured(const DepthView& from, const DepthView& to, double tolerance) {
+    const CommonPoints common = commonPoints(from, to, kMeasured, tolerance);
+    if (common.points.size() < kFewestPoints) return {};
+    std::vector<double> apart, own, there;
+    for (const CommonPoints::Point& p : common.points) {
+        apart.push_back(std::abs(p.at - p.shown) / p.at);
+        own.push_back(p.own);
+        there.push_back(p.at);
+    }
+    const auto quarter = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 4);
+    std::nth_element(apart.begin(), quarter, apart.end());
+    const glm::dvec2 a = finenessOf(*from.header, medianOf(std::move(own))),
+                     b = finenessOf(*to.header, medianOf(std::move(there)));
+    return {true, *quarter, std::max(kSameShare, kSameOfPixel * std::max(a.x, b.x)) + a.y + b.y};
+}
+
+/// Of the view with that index.
+ViewDisagreement ofView(int view, const std::vector<Pair>& pairs,
+                        const std::vector<OfPair>& found) {
+    ViewDisagreement out;
+    std::set<int> partners;
+    std::vector<double> values;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+        const Pair& pair = pairs[i];
+        if ((pair.from != view && pair.to != view) || !found[i].told) continue;
+        const int other = pair.from == view ? pair.to : pair.from;
+        partners.insert(other);
+        values.push_back(found[i].relative);
+        out.overlap += pair.overlap;
+        out.oneSurface = std::max(out.oneSurface, found[i].oneSurface);
+        if (out.farthest >= 0 && found[i].relative <= out.farthestBy) continue;
+        out.farthest = other;
+        out.farthestBy = found[i].relative;
+    }
+    if (values.empty()) return out;
+    out.partners = static_cast<int>(partners.size());
+    out.overlap /= static_cast<double>(values.size());
+    // Of three views one of which is off, the other two have one good partner each.
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    out.relative = *middle;
+    return out;
+}
+
+}  // namespace
+
+DepthDisagreement disagreement(std::span<const DepthView> views, const std::vector<Pair>& pairs,
+                               const OverlapSettings& settings) {
+    std::vector<OfPair> found(pairs.size());
+    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
+        const Pair& pair = pairs[static_cast<std::size_t>(i)];
+        found[static_cast<std::size_t>(i)] =
+            measured(views[static_cast<std::size_t>(pair.from)],
+                     views[static_cast<std::size_t>(pair.to)], settings.overlapTolerance);
+    });
+    DepthDisagreement result;
+    std::vector<double> values;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+        if (!found[i].told) continue;
+        values.push_back(found[i].relative);
+        result.overlap += pairs[i].overlap;
+    }
+    result.pairs = static_cast<int>(values.size());
+    if (result.pairs > 0) result.overlap /= result.pairs;
+    result.relative = medianOf(std::move(values));
+    for (std::size_t v = 0; v < views.size(); ++v)
+        result.views.push_back(ofView(static_cast<int>(v), pairs, found));
+    return result;
+}
+
+}  // namespace registration
+
+bool DepthDisagreement::disagrees() const {
+    return std::ranges::any_of(views, &ViewDisagreement::disagrees);
+}
+
+std::vector<DepthView> depthViewsOf(const Bundle& bundle) {
+    std::vector<DepthView> views;
+    for (const ReferenceView& view : bundle.views) views.push_back({&view, &view.depth});
+    return views;
+}
+
+DepthDisagreement measureDepthDisagreement(std::span<const DepthView> views,
+                                           const OverlapSettings& settings) {
+    return registration::disagreement(views, registration::overlappingPairs(views, settings),
+                                      settings);
+}
+
+DepthDisagreement measureDepthDisagreement(const Bundle& bundle, const OverlapSettings& settings) {
+    return measureDepthDisagreement(depthViewsOf(bundle), settings);
+}
+
+std::optional<std::string> disagreementNote(const Bundle& bundle, const DepthDisagreement& found,
+                                            bool aligned) {
+    constexpr std::size_t kNamed = 3;
+    std::vector<std::size_t> worst;
+    for (std::size_t v = 0; v < found.views.size(); ++v)
+        if (found.views[v].disagrees()) worst.push_back(v);
+    if (worst.empty()) return {};
+    std::ranges::stable_sort(worst, [&](std::size_t a, std::size_t b) {
+        return found.views[a].relative > found.views[b].relative;
+    });
+    std::string names;
+    for (std::size_t i = 0; i < std::min(kNamed, worst.size()); ++i)
+        names += fmt::format("{}'{}' by {:.2g} %", i > 0 ? ", " : "", bundle.views[worst[i]].name,
+                             100 * found.views[worst[i]].relative);
+    if (worst.size() > kNamed) names += fmt::format(" and {} more", worst.size() - kNamed);
+    const std::string help =
+        aligned ? "other poses did not help: their depth is off, or has another scale or lens than "
+                  "was said"
+                : "stx refine --with poses aligns cameras and depth; depth of another scale or "
+                  "lens than was said needs the options of stx convert";
+    return fmt::format(
+        "{} of {} disagree{} with what overlaps {} by more of the distance than counts as one "
+        "surface "
+        "({:.2g} %): {}; edges may show twice; {}",
+        worst.size(), counted(found.views.size(), "view"), worst.size() == 1 ? "s" : "",
+        worst.size() == 1 ? "it" : "them", 100 * found.views[worst.front()].oneSurface, names,
+        help);
+}
+
+}  // namespace stx
