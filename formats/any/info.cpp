@@ -14,8 +14,6 @@
 #include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
-#include "lib/base/counted.hpp"
-#include "lib/base/printable.hpp"
 #include "lib/model/splat_cloud.hpp"
 #include "lib/packing/packing.hpp"
 
@@ -455,122 +453,6 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
         if (options.agreement)
             out["agreement"] = agreementJson(bundle, out["container"] != "imageset", job);
     }
-    return out;
-}
-
-namespace {
-
-/// What a view sees, in the units that options take.
-std::string lensText(const Json& view) {
-    const double x = view["fieldOfView"][0].get<double>(), y = view["fieldOfView"][1].get<double>();
-    if (view["orthographic"].get<bool>())
-        return fmt::format("orthographic, window {:.6g} x {:.6g}", x, y);
-    return fmt::format("perspective, field of view {:.4g} x {:.4g} degrees", glm::degrees(x),
-                       glm::degrees(y));
-}
-
-}  // namespace
-
-std::string describeAsText(const Json& info) {
-    const auto text = [](const Json& v) {
-        return v.is_string() ? printable(v.get_ref<const std::string&>()) : v.dump();
-    };
-    std::string out = fmt::format("{}: {}, {} bytes\n", text(info["file"]), text(info["container"]),
-                                  text(info["bytes"]));
-    for (const char* key : {"object", "imageSet", "nodeKind", "title", "frames", "missing",
-                            "triangles", "vertices", "materials", "points", "used"}) {
-        if (info.contains(key) && !(key == std::string_view("frames") && info[key] == 1))
-            out += fmt::format("{}: {}\n", key, text(info[key]));
-    }
-    if (info.contains("duration"))
-        out += fmt::format("duration: {:.6g} s{}{}\n", info["duration"].get<double>(),
-                           info.contains("start")
-                               ? fmt::format(" from {:.12g} s", info["start"].get<double>())
-                               : "",
-                           info.contains("rate")
-                               ? fmt::format(", {:.6g} frames a second", info["rate"].get<double>())
-                               : "");
-    if (info.contains("splats")) {
-        const Json& s = info["splats"];
-        out += fmt::format(
-            "splats: {}, {} with an opacity below 0.1, harmonics of degree {}, {} colours, up is "
-            "{}\n",
-            text(s["count"]), text(s["nearlyTransparent"]), text(s["degree"]),
-            text(s["colourSpace"]), text(s["up"]));
-    }
-    if (info.contains("origin")) out += fmt::format("origin: {}\n", text(info["origin"]));
-    if (info.contains("bounds"))
-        out += fmt::format("bounds: {} to {}\n", text(info["bounds"]["min"]),
-                           text(info["bounds"]["max"]));
-    if (info.contains("environment")) {
-        const Json& e = info["environment"];
-        out += fmt::format("environment: {}", text(e["layout"]));
-        if (e.contains("width")) out += fmt::format(", {}x{}", text(e["width"]), text(e["height"]));
-        if (e.contains("faces")) out += fmt::format(", {} faces", e["faces"].size());
-        for (const auto& [key, what] :
-             {std::pair{"skyColours", "sky"}, {"groundColours", "ground"}})
-            if (e[key] > 0)
-                out +=
-                    fmt::format(", {} of {}", what, counted(e[key].get<std::size_t>(), "colour"));
-        if (e["orientation"][3] != 0.0)
-            out += fmt::format(", turned by {}", text(e["orientation"]));
-        out += "\n";
-    }
-    if (info.contains("pixels"))
-        out += fmt::format("pixels: {} of {} kept\n", text(info["pixels"]["kept"]),
-                           text(info["pixels"]["source"]));
-    if (info.contains("textures")) {
-        for (const auto& t : info["textures"])
-            out += fmt::format(
-                "texture {}: {}x{}{}{}\n", text(t["attribute"]), text(t["width"]),
-                text(t["height"]), t.contains("coding") ? ", " + text(t["coding"]) : "",
-                t.contains("bytes") && t["bytes"] > 0 ? fmt::format(", {} bytes", text(t["bytes"]))
-                                                      : "");
-    }
-    if (info.contains("objects"))
-        for (const auto& o : info["objects"])
-            out += fmt::format("object '{}': {} from view {} on, {:.1f} % of the textures\n",
-                               text(o["name"]), counted(o["views"].get<int>(), "view"),
-                               text(o["firstView"]), 100 * o["used"].get<double>());
-    if (info.contains("photo")) out += photoText(info["photo"]);
-    if (info.contains("views")) {
-        std::size_t i = 0;
-        if (info["views"].empty()) out += "no views: the scene shows no DepthImage with images\n";
-        for (const auto& v : info["views"]) {
-            if (!v.contains("nearPlane")) {  // of an image set
-                out += fmt::format("view {} '{}': {}x{}", i++, text(v["name"]), text(v["width"]),
-                                   text(v["height"]));
-                if (v.contains("colour")) out += fmt::format(", colour {}", text(v["colour"]));
-                if (v.contains("depth")) out += fmt::format(", depth {}", text(v["depth"]));
-                if (v.contains("missing"))
-                    for (const auto& name : v["missing"])
-                        out += fmt::format(", {} is missing", text(name));
-                out += "\n";
-                continue;
-            }
-            out += fmt::format(
-                "view {} '{}': {}x{}, {}-bit depth {:.6g}..{:.6g}, {}, at {:.10g} {:.10g} "
-                "{:.10g}{}{}{}{}{}{}{}\n",
-                i++, text(v["name"]), text(v["width"]), text(v["height"]), text(v["depthBits"]),
-                v["nearPlane"].get<double>(), v["farPlane"].get<double>(), lensText(v),
-                v["position"][0].get<double>(), v["position"][1].get<double>(),
-                v["position"][2].get<double>(),
-                v.contains("points") ? fmt::format(", {} points", text(v["points"])) : "",
-                v.contains("metallicRoughness") ? ", metallic-roughness" : "",
-                v.contains("emissive") ? ", emissive" : "",
-                v.value("noDepth", "") == "unknown" ? ", no depth: unknown" : "",
-                v.contains("refined") ? fmt::format(", refined ({})", text(v["refined"])) : "",
-                v.contains("pruned") ? ", pruned" : "",
-                v.contains("background") ? ", background" : "");
-        }
-    }
-    if (info.contains("streams")) {
-        for (const auto& s : info["streams"])
-            out += fmt::format(
-                "{} '{}': {} bytes{}\n", text(s["kind"]), text(s["name"]), text(s["bytes"]),
-                s.contains("time") ? fmt::format(", from {:g} s on", s["time"].get<double>()) : "");
-    }
-    if (info.contains("agreement")) out += agreementText(info["agreement"]);
     return out;
 }
 
