@@ -37,7 +37,7 @@ Option refineOption(Command& command, std::string& text);
 /// Refines what a command reads: an image set at its import, and whatever is there afterwards.
 class Refining {
   public:
-    explicit Refining(RefineSettings settings) : settings_(std::move(settings)) {}
+    explicit Refining(RefineSettings settings) : settings_(settings) {}
     Refining(const Refining&) = delete;
     Refining& operator=(const Refining&) = delete;
 

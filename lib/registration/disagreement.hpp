@@ -45,7 +45,9 @@ struct DepthDisagreement {
     int pairs = 0;       ///< that overlap
     double overlap = 0;  ///< share of an image that its partner sees, mean over the pairs
     /// Median over the pairs. Of a pair it is what a quarter of its points are not above, share of
-    /// the distance: among leaves most points of two exact views are of two surfaces.
+    /// the distance: among leaves most points of two exact views are of two surfaces (the median of
+    /// an exact oak tree is 0.3 %). A camera that moved along walls and floors, which are most of
+    /// what it sees, is not found by it.
     double relative = 0;
     std::vector<ViewDisagreement> views;  ///< as in the bundle
 
