@@ -191,8 +191,11 @@ int Program::run(const std::function<Result<int>()>& body) {
     } catch (const std::bad_alloc&) {
         code = fail(ErrorCode::failed, "out of memory; use smaller images or fewer --threads");
     } catch (const std::system_error& e) {
-        code = fail(ErrorCode::failed,
-                    "the system refused what the work needs, perhaps another thread: {}", e.what());
+        code = e.code() == std::errc::no_space_on_device
+                   ? fail(ErrorCode::io, "{}", e.what())
+                   : fail(ErrorCode::failed,
+                          "the system refused what the work needs, perhaps another thread: {}",
+                          e.what());
     } catch (const std::exception& e) {
         // TBB has its own way to say that there are no threads.
         const bool noThreads =

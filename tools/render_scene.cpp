@@ -1,9 +1,13 @@
 #include "tools/render_scene.hpp"
 
+#include <algorithm>
 #include <type_traits>
 
+#include "formats/any/open.hpp"
 #include "formats/any/sequences.hpp"
+#include "formats/files/files.hpp"
 #include "lib/model/median_distance.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/model/splat_cloud.hpp"
 
 namespace stx::tools {
@@ -57,6 +61,57 @@ Result<SwayPose> swayPose(const RenderOptions& o, Sequence& frames, const Job& j
     return swayPose(o.camera, bundle);
 }
 
+/// Views that would take more than this part of the memory limit go into a spool, of which the
+/// other part is in memory at a time.
+constexpr std::uint64_t kSpooledPart = 8, kBudgetPart = 32;
+/// What drawing from a spool takes beside that, bytes: for each pixel of all views what is known of
+/// blocks, and for each of the view that a thread prepares.
+constexpr std::uint64_t kKnown = 2, kPreparing = 40;
+
+/// Memory that drawing the views of a table takes.
+struct DrawingMemory {
+    std::uint64_t pixels = 0;
+    std::uint64_t inMemory = 0, fromSpool = 0;  ///< bytes
+
+    DrawingMemory(const ViewTable& table, RenderMode mode) {
+        const PeakMemory& drawing =
+            mode == RenderMode::splat ? peak::kSplatMode : peak::kSurfaceMode;
+        std::uint64_t most = 0;  // of a view
+        for (std::size_t i = 0; i < table.count(); ++i) {
+            const std::uint64_t own = table.pixelsOf(i);
+            pixels += own;
+            inMemory += table.bytesOf(i) + drawing.perPixel * own;
+            most = std::max(most, std::max(table.bytesToMake(i), kPreparing * own));
+        }
+        const auto atOnce =
+            std::min(static_cast<std::uint64_t>(threadCount()), std::uint64_t{table.count()});
+        const std::uint64_t beside = atOnce * most + kKnown * pixels;
+        fromSpool = beside + beside / (kBudgetPart - 1);
+    }
+};
+
+/// Opens what stands still. Views that would take much memory go into `spool`.
+Result<Model> openStill(const RenderOptions& o, std::unique_ptr<FileSpool>& spool, Job& job) {
+    STX_TRY(const auto kind, recognise(o.input));
+    if (!o.open.set.from.empty() || (kind != FileKind::exr && kind != FileKind::mpeg4))
+        return stx::open(o.input, o.open, job);
+    STX_TRY(auto opened, openMeshOrViews(o.input, o.open, job));
+    auto& table = std::get<std::unique_ptr<ViewTable>>(opened);
+    const DrawingMemory takes(*table, o.settings.mode);
+    const std::uint64_t limit = job.limits.maxMemoryBytes;
+    if (table->whole() || takes.inMemory <= limit / kSpooledPart ||
+        takes.inMemory <= takes.fromSpool) {
+        STX_TRY(auto bundle, wholeBundle(std::move(table), job));
+        return Model(std::move(bundle));
+    }
+    STX_CHECK(checkPeak({"drawing", 0}, takes.pixels, 0, takes.fromSpool, job.limits));
+    STX_TRY(spool, FileSpool::create(o.output == "-" ? std::filesystem::temp_directory_path()
+                                                     : folderOf(o.output),
+                                     limit / kBudgetPart));
+    STX_TRY(auto bundle, wholeBundle(*table, *spool, job));
+    return Model(std::move(bundle));
+}
+
 }  // namespace
 
 Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& settings,
@@ -80,7 +135,7 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
         noteUnused(Bundle(), o, command, program);
         return scene;
     }
-    STX_TRY(scene.model, stx::open(o.input, o.open, program.job));
+    STX_TRY(scene.model, openStill(o, scene.spool, program.job));
     noteUnused(scene.model, o, command, program);
     const auto addViews = [&](const auto& seen) -> Result<void> {
         for (const auto& v : seen.views) scene.context.views.push_back(v.camera);

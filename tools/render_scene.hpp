@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/files/file_spool.hpp"
 #include "formats/stx/stx.hpp"
 #include "tools/camera_options.hpp"
 #include "tools/environment_options.hpp"
@@ -46,7 +47,8 @@ inline constexpr const char* kEnvironmentLight = "environment";
 
 /// What is drawn.
 struct DrawnScene {
-    Model model;  ///< of what stands still
+    std::unique_ptr<FileSpool> spool;  ///< of a model that takes much memory; else null
+    Model model;                       ///< of what stands still
     std::unique_ptr<Renderer> still;
     std::unique_ptr<MovingPictures> moving;
     CameraContext context;

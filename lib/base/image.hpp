@@ -4,9 +4,10 @@
 #include <cassert>
 #include <cstddef>
 #include <span>
-#include <vector>
 
 #include <glm/glm.hpp>
+
+#include "lib/base/pixels.hpp"
 
 namespace stx {
 
@@ -57,17 +58,22 @@ class Image {
             std::copy_n(row(top + y).begin() + left, width, out.row(y).begin());
         return out;
     }
-    [[nodiscard]] std::span<T> pixels() { return pixels_; }
-    [[nodiscard]] std::span<const T> pixels() const { return pixels_; }
+    [[nodiscard]] std::span<T> pixels() { return {pixels_.data(), pixels_.size()}; }
+    [[nodiscard]] std::span<const T> pixels() const { return {pixels_.data(), pixels_.size()}; }
     [[nodiscard]] T* data() { return pixels_.data(); }
     [[nodiscard]] const T* data() const { return pixels_.data(); }
+
+    /// Moves the pixels into a spool, which must outlive them; null: they stay where they are.
+    void moveTo(PixelSpool* spool) {
+        if (spool) pixels_ = Pixels<T>(pixels_, spool);
+    }
 
     bool operator==(const Image&) const = default;
 
   private:
     int width_ = 0;
     int height_ = 0;
-    std::vector<T> pixels_;
+    Pixels<T> pixels_;
 };
 
 }  // namespace stx

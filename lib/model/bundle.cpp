@@ -8,6 +8,13 @@
 
 namespace stx {
 
+void ReferenceView::moveTo(PixelSpool* spool) {
+    texture.moveTo(spool);
+    depth.moveTo(spool);
+    for (Image<glm::vec3>* image : {&normal, &splatU, &splatV, &emissive}) image->moveTo(spool);
+    metallicRoughness.moveTo(spool);
+}
+
 std::int64_t ReferenceView::pointCount() const {
     return summariseDepth(depth.pixels()).points;
 }

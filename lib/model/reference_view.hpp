@@ -113,6 +113,9 @@ struct ReferenceView : ViewHeader {
     [[nodiscard]] bool hasNormals() const { return !normal.empty(); }
     [[nodiscard]] bool hasSplats() const { return !splatU.empty() && !splatV.empty(); }
 
+    /// Moves all images into a spool; see Image::moveTo().
+    void moveTo(PixelSpool* spool);
+
     /// Pixels that are points of the object.
     [[nodiscard]] std::int64_t pointCount() const;
     /// The same, and the error of check() when a depth is NaN or below 0.

@@ -57,6 +57,11 @@ class Texture {
         return rgbaFloat()->data()[pixel].a;
     }
 
+    /// See Image::moveTo().
+    void moveTo(PixelSpool* spool) {
+        std::visit([spool](auto& i) { i.moveTo(spool); }, image_);
+    }
+
     bool operator==(const Texture&) const = default;
 
   private:

@@ -198,12 +198,10 @@ Result<Bundle> wholeBundle(std::unique_ptr<ViewTable> table, Job& job) {
     return wholeBundle(*table, job);
 }
 
-Result<Bundle> wholeBundle(const ViewTable& table, Job& job) {
-    if (table.whole()) return table.about();
-    std::uint64_t bytes = 0;
-    for (std::size_t i = 0; i < table.count(); ++i) bytes += table.bytesOf(i);
-    if (auto ok = job.limits.checkAllocation(bytes, 1, "the views"); !ok)
-        return tl::unexpected(ok.error().at(table.where()));
+namespace {
+
+/// All views, each moved into the spool, if any, when it is read.
+Result<Bundle> allViews(const ViewTable& table, PixelSpool* spool, Job& job) {
     Bundle bundle = headersOf(table.about());
     const auto count = static_cast<std::int64_t>(table.count());
     std::vector<Result<void>> done(table.count());
@@ -214,6 +212,7 @@ Result<Bundle> wholeBundle(const ViewTable& table, Job& job) {
             STX_CHECK(job.checkCancelled());
             STX_TRY(auto view, table.view(index, job));
             bundle.views[index] = std::move(*ownView(std::move(view)));
+            bundle.views[index].moveTo(spool);
             job.progress(++finished, count, "reading views");
             return {};
         }();
@@ -221,6 +220,21 @@ Result<Bundle> wholeBundle(const ViewTable& table, Job& job) {
     for (Result<void>& result : done)
         if (!result) return propagate(result);
     return bundle;
+}
+
+}  // namespace
+
+Result<Bundle> wholeBundle(const ViewTable& table, Job& job) {
+    if (table.whole()) return table.about();
+    std::uint64_t bytes = 0;
+    for (std::size_t i = 0; i < table.count(); ++i) bytes += table.bytesOf(i);
+    if (auto ok = job.limits.checkAllocation(bytes, 1, "the views"); !ok)
+        return tl::unexpected(ok.error().at(table.where()));
+    return allViews(table, nullptr, job);
+}
+
+Result<Bundle> wholeBundle(const ViewTable& table, PixelSpool& spool, Job& job) {
+    return allViews(table, &spool, job);
 }
 
 void noteMaterialLeftOut(const ViewTable& table, Job& job) {

@@ -100,6 +100,8 @@ class ViewTable {
 /// All views of a table in memory. Errors: those of its views; (invalidInput) more than the memory
 /// limit.
 [[nodiscard]] Result<Bundle> wholeBundle(const ViewTable& table, Job& job);
+/// The same in a spool, which must outlive it.
+[[nodiscard]] Result<Bundle> wholeBundle(const ViewTable& table, PixelSpool& spool, Job& job);
 /// The same; what is in memory already is moved.
 [[nodiscard]] Result<Bundle> wholeBundle(std::unique_ptr<ViewTable> table, Job& job);
 

@@ -169,7 +169,12 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
         return opaque;
     };
     if (settings.mode == RenderMode::splat) settings.refine = settings.refine.forSplats();
-    const auto refined = [&](const PageSet& views) {
+    const auto refined = [&](const PageSet& views) -> Result<PageSet> {
+        if (views.spool()) {
+            // What agrees by itself is looked at one by one.
+            if (!views.mayRefine(settings.refine)) return views;
+            STX_CHECK(checkPeak(peak::kRefine, views.pixelCount(), 0, 0, job.limits));
+        }
         RefineReport report;
         PageSet better = views.refined(settings.refine, &report);
         for (const RefineStepInfo& info : refineSteps())
@@ -184,8 +189,11 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
         return settings.does(Stage::twins) ? set.distinct() : set;
     }();
     const PageSet captured = solid(inFront(distinct, settings, job));
-    PageSet drawn = refined(captured);
-    if (drawn.behind()) drawn = drawn.before(refined(solid(*drawn.behind())));
+    STX_TRY(PageSet drawn, refined(captured));
+    if (drawn.behind()) {
+        STX_TRY(PageSet behind, refined(solid(*drawn.behind())));
+        drawn = drawn.before(std::move(behind));
+    }
     if (settings.fill == Fill::background && settings.does(Stage::unmeasured) &&
         isOurs(backend, settings)) {
         StageTimer timer(settings.log.get(), "unmeasured", true);
@@ -213,6 +221,13 @@ Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bu
     STX_CHECK(checkPeak(settings.mode == RenderMode::splat ? peak::kSplatMode : peak::kSurfaceMode,
                         bundle.views, job.limits));
     return makeFrom(backend, bundle, settings, bundle.environment, device, job);
+}
+
+Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bundle,
+                                               PixelSpool& spool, const RenderSettings& settings,
+                                               int device, Job& job) {
+    STX_CHECK(bundle.check());
+    return makeFrom(backend, PageSet(bundle, spool), settings, bundle.environment, device, job);
 }
 
 Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Atlas& atlas,

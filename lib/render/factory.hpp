@@ -17,6 +17,13 @@ namespace stx {
 [[nodiscard]] Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bundle,
                                                              const RenderSettings& settings,
                                                              int device, Job& job);
+/// The same of a bundle in a spool, which must outlive the renderer: what is made of its pixels is
+/// kept there, too. Errors beside those: (invalidInput) captured views to refine side by side that
+/// take more memory than the limit.
+[[nodiscard]] Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bundle,
+                                                             PixelSpool& spool,
+                                                             const RenderSettings& settings,
+                                                             int device, Job& job);
 /// The same of an atlas, which is drawn from its own textures.
 [[nodiscard]] Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Atlas& atlas,
                                                              const RenderSettings& settings,

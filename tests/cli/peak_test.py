@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The memory of one large picture: a command refuses it under a limit that is too small, before it takes the memory, and
 does it under the limit that it names. `--measure` prints what each takes, in bytes a pixel. And of many views: commands that
-look at one at a time take no more for 48 of them than for 12.
+look at one at a time take no more for 48 of them than for 12, and pictures of views that do not fit memory are the same.
 
     tests/cli/peak_test.py build/release/bin/stx MODEL.obj SHARED_DIR --measure 1 --pixels 52
     tests/cli/peak_test.py build/release/bin/stx MODEL.obj SHARED_DIR --only many --measure 1
@@ -136,6 +136,33 @@ def many_views(args, folder):
     return wrong
 
 
+# Of pictures of 48 views of 512²: MiB that they may take, the program and its pictures included. A 32nd is for pixels
+# of views, of less than two; in memory they take 236 to 498.
+FEW = 200
+
+
+def from_few(args, folder):
+    """What is not the same, or takes too much, of pictures of 48 views that do not fit memory."""
+    wrong = []
+    for kind in ("exr", "mp4") if os.path.exists(args.model) else ():
+        for options in ("", "--quality best --light dir:0.5,-1.5,-1", "--mode splat"):
+            name = f"few {kind} {options}"
+            if args.only not in name:
+                continue
+            line = f"render many48.{kind} --orbit 3 --elevation 20 --size 512x512 --backend cpu --threads 2 {options}".split()
+            every = must([args.stx] + line + ["-o", "all_%d.png"], folder)
+            few = must([args.stx] + line + ["-o", "few_%d.png", "--max-memory", str(FEW)], folder)
+            pictures = [open(os.path.join(folder, f"{which}_{i}.png"), "rb").read() for which in ("all", "few") for i in range(3)]
+            peak = few.usage.ru_maxrss / 1024
+            if args.measure:
+                print(f"{name:46} {peak:6.1f} MiB, in memory {every.usage.ru_maxrss / 1024:6.1f}", flush=True)
+            elif peak > FEW:
+                wrong.append(f"{name}: {peak:.1f} MiB")
+            if pictures[:3] != pictures[3:]:
+                wrong.append(f"{name}: the pictures are not those of a larger --max-memory")
+    return wrong
+
+
 def main():
     args = harness.arguments(__doc__, measure=0, pixels=14, views=1, only="")
     wrong = []
@@ -179,6 +206,7 @@ def main():
             if done.code != 0 or peak > limit + beside:
                 wrong.append(f"{name}: {peak} MiB at --max-memory {limit}: exit code {done.code} {text}")
         wrong += many_views(args, folder)
+        wrong += from_few(args, folder)
     print("\n".join(wrong))
     sys.exit(1 if wrong else 0)
 

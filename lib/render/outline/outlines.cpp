@@ -109,6 +109,7 @@ Outlines::Outlines(PageSet set) : set_(std::move(set)) {
     const auto rectangles = set_.rectangles();
     std::vector<std::vector<OutlineBlock>> found(rectangles.size());
     parallelFor(0, static_cast<std::int64_t>(rectangles.size()), [&](std::int64_t n) {
+        set_.settle();
         const PageRectangle& r = rectangles[static_cast<std::size_t>(n)];
         const Page& page = set_.pages()[static_cast<std::size_t>(r.page)];
         for (int v = 0; v < r.height; v += kOutlineBlock) {

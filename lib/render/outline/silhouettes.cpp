@@ -130,6 +130,7 @@ float Silhouettes::alphaBilinear(const View& view, double x, double y) const {
 Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
     std::vector<View> all(set_.views().size());
     parallelFor(0, static_cast<std::int64_t>(all.size()), [&](std::int64_t n) {
+        set_.settle();
         const auto number = static_cast<std::size_t>(n);
         const Camera& camera = set_.views()[number].camera;
         const int w = camera.width, h = camera.height;
@@ -140,6 +141,8 @@ Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
         View view{number, camera, {}, {}};
         view.around = aroundOf(alpha);
         if (set_.find(number, 0, 0, w - 1, h - 1)) view.alpha = std::move(alpha);
+        view.around.moveTo(set_.spool());
+        view.alpha.moveTo(set_.spool());
         all[number] = std::move(view);
     });
     for (auto& view : all) {
@@ -237,8 +240,8 @@ void Silhouettes::carve(Frame& frame, const Camera& camera, const Extent& drawn)
         const int first = std::max(part.y0, from - kReach),
                   last = std::min(part.y1 - 1, to - 1 + kReach);
         Image<std::uint8_t> rowMarks(across, last - first + 1);
-        std::vector<std::uint8_t> empty(static_cast<std::size_t>(across) + 2 * kReach);
-        std::vector<std::uint8_t> mark(static_cast<std::size_t>(across));
+        const auto width = static_cast<std::size_t>(std::max(across, 0));
+        std::vector<std::uint8_t> empty(width + 2 * kReach), mark(width);
         for (int y = first; y <= last; ++y)
             markRow(frame.depth.row(y).data() + part.x0, across, empty.data(),
                     rowMarks.row(y - first).data());

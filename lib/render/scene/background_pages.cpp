@@ -49,6 +49,7 @@ PageSet PageSet::only(const std::vector<bool>& kept) const {
     data->padding = data_->padding;
     data->bounds = data_->bounds;
     data->farAway = data_->farAway;
+    data->spool = data_->spool;
     data->unpacked = data_->unpacked;
     data->changed = data_->changed;
     data->refined = data_->refined;
@@ -115,6 +116,7 @@ PageSet PageSet::inLightOf(const PageSet& other) const {
     if (!data) return *this;
     for (std::size_t i = 0; i < textures.size(); ++i) {
         if (!textures[i]) continue;
+        textures[i]->moveTo(spool());
         data->pages[i].texture = textures[i].get();
         data->changed.push_back(std::move(textures[i]));
     }

@@ -36,6 +36,7 @@ PageSet PageSet::inOneLight(const RefineSettings& settings, RefineStepReport& re
     for (std::size_t i = 0; i < textures.size(); ++i) {
         data->captured.push_back(&captured(i));
         if (!textures[i]) continue;
+        textures[i]->moveTo(spool());
         data->pages[i].texture = textures[i].get();
         data->changed.push_back(std::move(textures[i]));
     }

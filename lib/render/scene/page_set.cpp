@@ -95,6 +95,13 @@ PageSet::PageSet(const Bundle& bundle) {
     data_ = std::move(data);
 }
 
+PageSet::PageSet(const Bundle& bundle, PixelSpool& spool) {
+    auto data = std::make_shared<Data>();
+    addBundle(bundle, *data);
+    data->spool = &spool;
+    data_ = std::move(data);
+}
+
 Result<PageSet> PageSet::of(const Atlas& atlas, Job& job) {
     STX_CHECK(atlas.check());
     auto data = std::make_shared<Data>();
@@ -174,6 +181,14 @@ bool PageSet::exactDepth() const {
     return std::none_of(views().begin(), views().end(), [](const PageView& v) {
         return v.refined.doubt > 0 || wasDone(RefineStep::edges, v.refined);
     });
+}
+
+std::uint64_t PageSet::pixelCount() const {
+    std::uint64_t n = 0;
+    for (const PageView& v : views())
+        n += static_cast<std::uint64_t>(v.camera.width) *
+             static_cast<std::uint64_t>(v.camera.height);
+    return n;
 }
 
 std::int64_t PageSet::pointCount() const {

@@ -75,6 +75,8 @@ class PageSet {
     static constexpr int kPadding = 2;
 
     PageSet(const Bundle& bundle);  // NOLINT: a bundle is a set of pages
+    /// The same of a bundle in a spool. What is made of its pixels is kept there, too.
+    PageSet(const Bundle& bundle, PixelSpool& spool);
     /// The pages of an atlas. Where the rectangles do not have kPadding pixels of padding to
     /// themselves (see Atlas::paddingHolds()) it is unpacked first, which costs the views' memory.
     /// Errors: an atlas that fails check(), memory over the limit.
@@ -89,9 +91,17 @@ class PageSet {
         return rectangles().subspan(v.firstRectangle, v.rectangleCount);
     }
 
+    /// Where pixels are kept that are made of these; null: in memory. It outlives the set.
+    [[nodiscard]] PixelSpool* spool() const { return data_->spool; }
+    /// See PixelSpool::settle().
+    void settle() const {
+        if (spool()) spool()->settle();
+    }
     [[nodiscard]] bool linear() const { return data_->pages[0].texture->isLinear(); }
     [[nodiscard]] bool pruned() const { return data_->pruned; }
     [[nodiscard]] std::int64_t pointCount() const;
+    /// Of all views.
+    [[nodiscard]] std::uint64_t pixelCount() const;
     /// The same with translucent surfaces made opaque, for renderers to whom alpha says how much of
     /// a pixel the object covers at its outline: points with translucent points all around them,
     /// and those beside such, get full alpha. `changed` tells whether there were any.
@@ -113,6 +123,8 @@ class PageSet {
     /// agree already, or were refined before.
     [[nodiscard]] PageSet inOneLight(const RefineSettings& settings,
                                      RefineStepReport& report) const;
+    /// Whether refined() may change something. Looks at one view after the other.
+    [[nodiscard]] bool mayRefine(const RefineSettings& settings) const;
     /// The same with the depth of its views refined, those behind it not: the very same where depth
     /// is exact. `report`, if any, tells what was found and changed.
     [[nodiscard]] PageSet refined(const RefineSettings& settings,
@@ -216,6 +228,7 @@ class PageSet {
         double farAway = 0;
         int padding = 0;  ///< texels around each rectangle that may be read
         bool pruned = false;
+        PixelSpool* spool = nullptr;
         std::shared_ptr<const Bundle> unpacked;  ///< of an atlas without room around rectangles
         /// Of solid(), inLightOf() and inOneLight().
         std::vector<std::shared_ptr<const Texture>> changed;

@@ -35,6 +35,27 @@ void putDepth(const Image<float>& depth, const PageRectangle& r, Image<float>& p
         }
 }
 
+bool PageSet::mayRefine(const RefineSettings& settings) const {
+    RefineSettings left = settings;
+    for (const PageView& view : views()) left = left.after(view.refined);
+    if (!left.any()) return false;
+    std::vector<RefineNeeds> ofViews(views().size(), RefineNeeds(left));
+    const auto look = [&](std::size_t i) {
+        settle();
+        ReferenceView copy;
+        ofViews[i].add(viewImages(*this, i, copy));
+    };
+    // Copies of views in rectangles take memory.
+    if (views().front().whole)
+        parallelFor(0, static_cast<std::int64_t>(ofViews.size()),
+                    [&](std::int64_t i) { look(static_cast<std::size_t>(i)); });
+    else
+        for (std::size_t i = 0; i < ofViews.size(); ++i) look(i);
+    RefineNeeds needs(left);
+    for (const RefineNeeds& found : ofViews) needs.add(found);
+    return needs.any();
+}
+
 PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) const {
     RefineReport own;
     RefineReport& found = report ? *report : own;
@@ -44,14 +65,7 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) c
     if (!left.any() || views().empty()) return *this;
     const bool whole =
         std::all_of(views().begin(), views().end(), [](const PageView& v) { return v.whole; });
-    if (!whole) {
-        RefineNeeds needs(left);
-        for (std::size_t i = 0; i < views().size(); ++i) {
-            ReferenceView copy;
-            needs.add(viewImages(*this, i, copy));
-        }
-        if (!needs.any()) return *this;
-    }
+    if (!whole && !mayRefine(left)) return *this;
     std::vector<ReferenceView> copies(views().size());
     std::vector<RefineView> given(views().size());
     parallelFor(0, static_cast<std::int64_t>(given.size()), [&](std::int64_t i) {
@@ -79,6 +93,7 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) c
     }
     for (std::size_t i = 0; i < depths.size(); ++i) {
         if (!depths[i]) continue;
+        depths[i]->moveTo(spool());
         data->pages[i].depth = depths[i].get();
         data->refined.push_back(std::move(depths[i]));
     }

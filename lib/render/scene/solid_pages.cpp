@@ -76,6 +76,7 @@ PageSet PageSet::solid(bool& changed) const {
     std::shared_ptr<Data> data;
     for (std::size_t i = 0; i < data_->pages.size(); ++i) {
         const Page& page = data_->pages[i];
+        settle();
         const auto inside = translucentInside(*page.texture, *page.depth);
         if (std::none_of(inside.pixels().begin(), inside.pixels().end(),
                          [](std::uint8_t v) { return v != 0; }))
@@ -88,6 +89,7 @@ PageSet PageSet::solid(bool& changed) const {
             if (auto* image = texture->rgba8()) image->data()[p].w = 255;
             if (auto* image = texture->rgbaFloat()) image->data()[p].w = 1.0f;
         }
+        texture->moveTo(spool());
         data->pages[i].texture = texture.get();
         data->changed.push_back(std::move(texture));
     }

@@ -46,6 +46,7 @@ PageSet PageSet::withUnmeasured(const PageSet& captured, std::int64_t& pixels) c
     }
     for (std::size_t i = 0; i < depths.size(); ++i) {
         if (!depths[i]) continue;
+        depths[i]->moveTo(spool());
         data->pages[i] = {data->pages[i].texture, depths[i].get(), nullptr, nullptr, nullptr};
         data->refined.push_back(std::move(depths[i]));
     }

@@ -48,7 +48,7 @@ struct Samples {
     bool edges = false;  // not all are linked
 };
 
-Samples samplesOf(const PageRectangle& r, const Page& page, const std::vector<Slope>& slopes,
+Samples samplesOf(const PageRectangle& r, const Page& page, const Pixels<Slope>& slopes,
                   const BlockInfo& b, int quarter) {
     Samples out;
     const int x0 = b.u0 + (quarter & 1) * kHalf, y0 = b.v0 + (quarter >> 1) * kHalf;
@@ -169,6 +169,7 @@ std::vector<std::size_t> candidates(const PageSet& set, const PreparedRectangle&
 
 void findOthers(const PageSet& set, PreparedPages& prepared) {
     for (PreparedRectangle& rectangle : prepared.rectangles) {
+        set.settle();
         const PageRectangle& r = *rectangle.rectangle;
         const Camera& own = rectangle.camera();
         for (BlockInfo& b : rectangle.blocks) {

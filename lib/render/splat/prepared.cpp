@@ -299,11 +299,13 @@ PreparedPages preparePages(const PageSet& set, bool wantNormals) {
         const std::size_t count = page.depth->count();
         prepared.firstPoint = firstPoint;
         firstPoint += static_cast<std::uint32_t>(count);
-        prepared.slopes.resize(count);
-        if (wantNormals) prepared.normals.resize(count);
-        if (splats && page.splatU && page.splatV) prepared.sizes.assign(count, 64);
+        prepared.slopes = Pixels<Slope>(count, {}, set.spool());
+        if (wantNormals) prepared.normals = Pixels<glm::i8vec4>(count, {}, set.spool());
+        if (splats && page.splatU && page.splatV)
+            prepared.sizes = Pixels<std::uint8_t>(count, 64, set.spool());
     }
     for (const PageRectangle& rectangle : set.rectangles()) {
+        set.settle();
         const Window w(set, rectangle);
         PreparedPage& page = out.pages[static_cast<std::size_t>(rectangle.page)];
         const glm::mat3 cameraFromWorld(

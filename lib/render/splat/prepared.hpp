@@ -62,10 +62,10 @@ struct Others {
 
 /// What is known of each texel of a page before any camera is. Arrays of one value per texel.
 struct PreparedPage {
-    std::vector<Slope> slopes;
-    std::vector<glm::i8vec4> normals;  ///< in the world, * 127; empty when not needed
-    std::vector<std::uint8_t> sizes;   ///< splat sizes * 64 where the file gives them, else empty
-    std::uint32_t firstPoint = 0;      ///< number of texel 0, counted over all pages
+    Pixels<Slope> slopes;
+    Pixels<glm::i8vec4> normals;   ///< in the world, * 127; empty when not needed
+    Pixels<std::uint8_t> sizes;    ///< splat sizes * 64 where the file gives them, else empty
+    std::uint32_t firstPoint = 0;  ///< number of texel 0, counted over all pages
 };
 
 /// A rectangle of a PageSet and its blocks, in pixels of PageRectangle::window.

@@ -173,9 +173,10 @@ void SurfaceRenderer::findNormals() {
         if (scene_.sources[i].view->hasNormals) continue;
         for (const PageRectangle& r : scene_.set.rectanglesOf(i)) {
             const auto page = static_cast<std::size_t>(r.page);
-            if (normals_[page].empty())
-                normals_[page] = Image<glm::vec3>(scene_.pages[page].q.width(),
-                                                  scene_.pages[page].q.height(), glm::vec3(0.0f));
+            if (!normals_[page].empty()) continue;
+            normals_[page] = Image<glm::vec3>(scene_.pages[page].q.width(),
+                                              scene_.pages[page].q.height(), glm::vec3(0.0f));
+            normals_[page].moveTo(scene_.set.spool());
         }
     }
     const auto ofView = [&](std::size_t i) {

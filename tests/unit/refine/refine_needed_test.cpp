@@ -66,6 +66,14 @@ TEST(RefineNeeded, NotOfExactViews) {
         expectNeeds(analyticBundle(scene, 6), {}, false, 6);
 }
 
+TEST(RefineNeeded, ReadsWhatIsBehindByItself) {
+    Bundle torus = torusViews(96);
+    torus.views[3].background = torus.views[7].background = true;
+    RefineSettings without;
+    without.set(RefineStep::exposure, false);
+    expectNeeds(torus, without, false, 1);
+}
+
 TEST(RefineNeeded, OfNoise) {
     Bundle noisy = torusViews(96);
     noisy::addNoise(noisy, 0.01);

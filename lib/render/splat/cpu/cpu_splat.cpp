@@ -217,7 +217,10 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     }
     {
         const StageTimer timer(settings_.log.get(), "draw");
-        parallelFor(0, regions, [&](std::int64_t n) { drawRegion(picture, static_cast<int>(n)); });
+        parallelFor(0, regions, [&](std::int64_t n) {
+            drawRegion(picture, static_cast<int>(n));
+            set_.settle();
+        });
     }
     if (settings_.splat == SplatRule::data) {
         const auto& colour = picture.frame.colour;

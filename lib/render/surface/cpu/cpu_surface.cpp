@@ -26,7 +26,9 @@ class CpuSurfaceBackend final : public SurfaceBackend {
     Result<void> finish(DrawnFrame out) override {
         parallelFor(0, static_cast<std::int64_t>(frame_->tilesX) * frame_->tilesY,
                     [&](std::int64_t tile) {
-                        if (!job_.cancelled) drawTile(*frame_, static_cast<int>(tile), out);
+                        if (job_.cancelled || frame_->sources.empty()) return;
+                        drawTile(*frame_, static_cast<int>(tile), out);
+                        frame_->sources.front().source->set->settle();
                     });
         return {};
     }

@@ -226,6 +226,7 @@ void addSourcesOfPlaces(SurfaceFrame& frame, std::span<const std::vector<PlacedB
                     others[k].push_back({x, y, q, rise()});
             });
         }
+        frame.sources[k].source->set->settle();
         const std::scoped_lock lock(mutex);
         nearest.add(own);
     });

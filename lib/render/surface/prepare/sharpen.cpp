@@ -90,6 +90,7 @@ std::vector<std::shared_ptr<const Texture>> sharpenedTextures(const SurfaceScene
             else
                 sharpen(s, r, from.rgbaFloat()->data(), to.rgbaFloat()->data());
         }
+        to.moveTo(scene.set.spool());
         textures.push_back(std::make_shared<const Texture>(std::move(to)));
     }
     return textures;

@@ -119,6 +119,10 @@ void keep(Source& s, Draft&& d, std::vector<PreparedPage>& pages) {
         page.q = std::move(d.q);
         page.info = std::move(d.info);
         page.levels = std::move(d.levels);
+        PixelSpool* const spool = s.set->spool();
+        page.q.moveTo(spool);
+        page.info.moveTo(spool);
+        page.levels.moveTo(spool);
         return;
     }
     for (const PageRectangle& r : s.set->rectanglesOf(s.number)) {
@@ -254,6 +258,7 @@ float typicalDist(const Source& s, const Draft& d) {
 /// Links, edges, planar pieces and outlines of a source, from its points.
 void prepareSource(Source& s, const RenderSettings& settings, bool blends,
                    std::vector<PreparedPage>& pages) {
+    s.set->settle();
     const Camera& camera = s.view->camera;
     s.width = camera.width;
     s.height = camera.height;

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+
+#include "lib/base/pixels.hpp"
+#include "lib/base/result.hpp"
+
+namespace stx {
+
+/// Pixels in a file without a name, which is gone with this. It is mapped: what is read or written
+/// comes into memory page by page, and all of it is given back there whenever it takes more than a
+/// budget, to the file, from where it comes again. So whatever goes over the pixels takes no more
+/// memory than that, however many there are.
+class FileSpool final : public PixelSpool {
+  public:
+    /// `budget`: bytes. Errors (io): no file can be made in `folder`.
+    [[nodiscard]] static Result<std::unique_ptr<FileSpool>> create(
+        const std::filesystem::path& folder, std::uint64_t budget);
+    ~FileSpool() override;
+
+    /// Where the file cannot grow, on a full disk, the error is a std::system_error.
+    [[nodiscard]] void* take(std::size_t bytes) override;
+    void give(void* room, std::size_t bytes) noexcept override;
+    void settle() noexcept override;
+
+  private:
+    struct File;
+    explicit FileSpool(std::unique_ptr<File> file);
+
+    std::unique_ptr<File> file_;
+};
+
+}  // namespace stx
