@@ -142,14 +142,14 @@ FEW = 200
 
 
 def from_few(args, folder):
-    """What is not the same, or takes too much, of pictures of 48 views that do not fit memory."""
+    """What is not the same, or takes too much, of pictures of 36 views that do not fit memory."""
     wrong = []
     for kind in ("exr", "mp4") if os.path.exists(args.model) else ():
         for options in ("", "--quality best --light dir:0.5,-1.5,-1", "--mode splat"):
             name = f"few {kind} {options}"
             if args.only not in name:
                 continue
-            line = f"render many48.{kind} --orbit 3 --elevation 20 --size 512x512 --backend cpu --threads 2 {options}".split()
+            line = f"render many36.{kind} --orbit 3 --elevation 20 --size 512x512 --backend cpu --threads 2 {options}".split()
             every = must([args.stx] + line + ["-o", "all_%d.png"], folder)
             few = must([args.stx] + line + ["-o", "few_%d.png", "--max-memory", str(FEW)], folder)
             pictures = [open(os.path.join(folder, f"{which}_{i}.png"), "rb").read() for which in ("all", "few") for i in range(3)]
