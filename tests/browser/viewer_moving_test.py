@@ -23,18 +23,20 @@ def main():
         test.stx_run("convert", args.model, "-o", "still.exr", "--views", "ring:4", "--size", "200x200")
         film_set(args.stx, test.path("still.exr"), test.path("film"))
         test.stx_run("convert", "film", "-o", "film.mp4")
-        test.stx_run("extract", "film.mp4", "-o", "film.html")
+        test.stx_run("convert", "film", "-o", "jpeg.mp4", "--colour", "jpeg")
+        for name in ("film", "jpeg"):
+            test.stx_run("extract", f"{name}.mp4", "-o", f"{name}.html")
         with chromium.Browser() as browser:
             browser.size(320, 240)
             eye = "--eye=0.8,1.2,3"
-            for time in (0, 0.2):
-                show(browser, test.path("film.html"),
+            for name, time in (("film", 0), ("film", 0.2), ("jpeg", 0.2)):
+                show(browser, test.path(f"{name}.html"),
                      f"eye=0.8,1.2,3&target=0,0.5,0&fov=40&size=320x240&ui=off&background=%23000000&time={time}")
                 browser.picture(test.path("shot.png"), 320, 240)
-                test.stx_run("render", "film.mp4", "-o", "wanted.png", "--mode", "splat", eye, "--target=0,0.5,0", "--fov", "40",
+                test.stx_run("render", f"{name}.mp4", "-o", "wanted.png", "--mode", "splat", eye, "--target=0,0.5,0", "--fov", "40",
                              "--size", "320x240", "--background", "black", "--time", str(time), "--backend", "cpu")
                 found = psnr(args.stx, "shot.png", "wanted.png", folder)
-                test.check(found >= LEAST, f"at {time} s: {found:.1f} dB")
+                test.check(found >= LEAST, f"{name} at {time} s: {found:.1f} dB")
             show(browser, test.path("film.html"), "")
             test.check(browser.ask("!document.getElementById('time-row').hidden"), "a film has a slider of time")
             browser.ask("viewer.seen = new Set(), viewer.show0 = viewer.showFrame.bind(viewer),"

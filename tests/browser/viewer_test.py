@@ -3,6 +3,7 @@
 touch, and what is said where WebGL 2 is missing."""
 import contextlib
 import http.server
+import json
 import os
 import shlex
 import sys
@@ -87,20 +88,27 @@ def models(test, browser, args):
 
 def copied_pictures(test, browser):
     """JPEG pictures of a bundle are in its page as they are, and browsers decode them as stx does."""
-    test.stx_run("convert", "amphora.mp4", "-o", "streams.mp4", "--colour", "jpeg")
+    # Cameras that look aside have padding in MPEG-4; what they see does not fit together then.
+    test.stx_run("extract", "amphora.mp4", "-o", "aside")
+    with open(test.path("aside/transforms.json"), encoding="utf-8") as file:
+        cameras = json.load(file)
+    for frame in cameras["frames"]:
+        frame["cx"], frame["cy"] = frame.get("cx", cameras.get("cx")) + 9, frame.get("cy", cameras.get("cy")) - 4
+    with open(test.path("aside/transforms.json"), "w", encoding="utf-8") as file:
+        json.dump(cameras, file)
+    test.stx_run("convert", "aside", "-o", "streams.mp4", "--colour", "jpeg")
     test.stx_run("extract", "streams.mp4", "-o", "exact.html", "--colour", "png")
     test.stx_run("extract", "streams.mp4", "-o", "streams.html")
     sizes = [os.path.getsize(test.path(f"{name}.html")) for name in ("streams", "exact")]
     test.check(sizes[0] < 0.8 * sizes[1], f"amphora of JPEG pictures: {sizes[0]} bytes, as PNG {sizes[1]}")
     for name in ("exact", "streams"):
-        test.compare(browser, f"amphora of JPEG pictures, {name}", f"{name}.html", "streams.mp4", "1.5,1.2,2.5", "0,0.5,0")
-        os.replace(test.path("shot.png"), test.path(f"{name}.png"))
+        show(browser, test.path(f"{name}.html"), f"eye=1.5,1.2,2.5&target=0,0.5,0&fov=40&size={SIZE}&ui=off&background=%23000000")
+        browser.picture(test.path(f"{name}.png"), *map(int, SIZE.split("x")))
     found = psnr(test.stx, "streams.png", "exact.png", test.folder)
     test.check(found >= 60, f"the browser's decoder against stx's: {found:.1f} dB")
 
 
 def bounds_of(test, name):
-    import json
     done = test.stx_run("info", name, "--format", "json", "--bounds")
     bounds = json.loads(done.out)["bounds"]
     return bounds["min"], bounds["max"]
