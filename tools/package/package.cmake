@@ -44,7 +44,7 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION libs)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "stx, libegl1, libopengl0, libgl1-mesa-dri")
 set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
-    "The shared library, for programs that use it. Images other than PNG, JPEG\nand OpenEXR are read by a module that the package stx has.")
+    "The shared library, for programs that use it. Images other than PNG, JPEG\nand OpenEXR, foreign models and films are read by modules and a program that\nthe package stx has.")
 file(WRITE ${CMAKE_BINARY_DIR}/package/shlibs
      "libstx ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} ${runtime} (>= ${PROJECT_VERSION})\n")
 file(WRITE ${CMAKE_BINARY_DIR}/package/triggers "activate-noawait ldconfig\n")
