@@ -97,6 +97,7 @@ void addInfo(CommandLine& line, Program& program) {
                          "  stx info model.mp4\n"
                          "  stx info model.exr --format json --bounds\n"
                          "  stx info capture.exr --agreement\n"
+                         "  stx info capture.exr --memory\n"
                          "  stx info model.mp4 --cameras cameras.svg");
     auto o = std::make_shared<InfoCommandOptions>();
     c.option("FILE", o->input, "Bundle, atlas, mesh or image set").required();
@@ -105,6 +106,9 @@ void addInfo(CommandLine& line, Program& program) {
     c.flag("--agreement", o->info.agreement,
            "Compare the views: by how much each differs in depth from those that overlap it, as a "
            "table; a note names views that are off, by their cameras or their depth");
+    c.flag("--memory", o->info.memory,
+           "How much memory each command takes at most on these views, as a table; views are read "
+           "once to find whether they would be refined");
     c.option("--cameras", o->plot,
              "Draw the cameras around the object, from above and from the side, as an SVG picture")
         .takes("FILE.svg");

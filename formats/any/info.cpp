@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "formats/any/info_agreement.hpp"
+#include "formats/any/info_memory.hpp"
 #include "formats/any/info_photo.hpp"
 #include "formats/any/open.hpp"
 #include "formats/any/sequences.hpp"
@@ -416,6 +417,11 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
                             "'{}' is a mesh, which has no views that could agree; leave out "
                             "--agreement",
                             path.string());
+            if (options.memory)
+                return fail(ErrorCode::usage,
+                            "'{}' is a mesh; what its views take depends on --views and --size of "
+                            "stx convert; leave out --memory",
+                            path.string());
             STX_TRY(const auto mesh, readMesh(path, job));
             out["container"] = "mesh";
             out["triangles"] = mesh.triangles.size();
@@ -452,6 +458,16 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
         // An import names views that are off by itself.
         if (options.agreement)
             out["agreement"] = agreementJson(bundle, out["container"] != "imageset", job);
+    }
+    if (options.memory) {
+        auto memory = [&]() -> Result<Json> {
+            const bool onDemand = kind == FileKind::mpeg4 || out["container"] == "exr";
+            if (!onDemand) return memoryOfSizes(out["views"]);
+            STX_TRY(const auto table, openViews(path, open, job));
+            return memoryJson(*table, job);
+        }();
+        if (!memory) return tl::unexpected(memory.error().at(fmt::format("'{}'", path.string())));
+        out["memory"] = *std::move(memory);
     }
     return out;
 }

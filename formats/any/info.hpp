@@ -15,12 +15,14 @@ struct InfoOptions {
     /// Decode the pixels and measure by how much each view disagrees with those that overlap it; a
     /// note names those that do.
     bool agreement = false;
+    /// The memory that each command takes at most; views on demand are read once to find it.
+    bool memory = false;
     std::string object;  ///< as OpenOptions::object; empty: of all
 };
 
 /// What is in a file, as JSON by tools/schemas/info.schema.json: container, node kind, cameras,
-/// sizes, bytes. Reads headers only, unless options.bounds or
-/// options.agreement asks for more. Errors: io, invalidInput.
+/// sizes, bytes. Reads headers only, unless options.bounds,
+/// options.agreement or options.memory asks for more. Errors: io, invalidInput.
 [[nodiscard]] Result<nlohmann::ordered_json> describe(const std::filesystem::path& path,
                                                       const InfoOptions& options, Job& job);
 

@@ -2,6 +2,7 @@
 
 #include "formats/any/info.hpp"
 #include "formats/any/info_agreement.hpp"
+#include "formats/any/info_memory.hpp"
 #include "formats/any/info_photo.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/base/printable.hpp"
@@ -133,6 +134,7 @@ std::string describeAsText(const Json& info) {
     });
     each("streams", streamText);
     if (info.contains("agreement")) out += agreementText(info["agreement"]);
+    if (info.contains("memory")) out += memoryText(info["memory"]);
     return out;
 }
 

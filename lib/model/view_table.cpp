@@ -257,6 +257,39 @@ std::unique_ptr<ViewTable> watchedViews(
     return std::make_unique<WatchedViews>(std::move(table), std::move(look));
 }
 
+namespace {
+
+/// Of a view that comes and is worked on, beside what the table holds.
+std::uint64_t memoryOfOne(const ViewTable& table, std::size_t index, const PeakMemory& work) {
+    const std::uint64_t working = (work.perPixel + work.perPixelOfLargest) * table.pixelsOf(index);
+    return std::max(table.bytesToMake(index), table.bytesGiven(index) + working);
+}
+
+std::uint64_t mostAtOnce(const ViewTable& table) {
+    const auto threads = static_cast<std::uint64_t>(threadCount());
+    return table.mostAtOnce() > 0
+               ? std::min(threads, static_cast<std::uint64_t>(table.mostAtOnce()))
+               : threads;
+}
+
+}  // namespace
+
+std::uint64_t memoryOfEach(const ViewTable& table, const PeakMemory& work) {
+    std::uint64_t most = 0;
+    for (std::size_t i = 0; i < table.count(); ++i)
+        most = std::max(most, memoryOfOne(table, i, work));
+    return table.bytesHeld() + most * std::min<std::uint64_t>(mostAtOnce(table), table.count());
+}
+
+std::uint64_t memoryOfAll(const ViewTable& table, const PeakMemory& work) {
+    std::uint64_t bytes = 0, largest = 0;
+    for (std::size_t i = 0; i < table.count(); ++i) {
+        bytes += table.bytesOf(i) + work.perPixel * table.pixelsOf(i);
+        largest = std::max(largest, table.pixelsOf(i));
+    }
+    return bytes + work.perPixelOfLargest * largest;
+}
+
 Result<void> forEachView(
     const ViewTable& table, const PeakMemory& work, Job& job,
     const std::function<Result<void>(std::size_t, std::shared_ptr<const ReferenceView>)>& each,
@@ -266,17 +299,12 @@ Result<void> forEachView(
     const std::uint64_t held = table.bytesHeld();
     std::uint64_t most = 1;  // that a view takes
     for (std::size_t i = 0; i < count; ++i) {
-        const std::uint64_t pixels = table.pixelsOf(i);
-        const std::uint64_t working = (work.perPixel + work.perPixelOfLargest) * pixels;
-        const std::uint64_t takes = std::max(table.bytesToMake(i), table.bytesGiven(i) + working);
+        const std::uint64_t pixels = table.pixelsOf(i), takes = memoryOfOne(table, i, work);
         STX_CHECK(checkPeak({work.what, 0}, pixels, pixels, held + takes, job.limits));
         most = std::max(most, takes);
     }
     const auto room = (job.limits.maxMemoryBytes - held) / most;
-    std::uint64_t atOnce =
-        std::clamp<std::uint64_t>(room, 1, static_cast<std::uint64_t>(threadCount()));
-    if (table.mostAtOnce() > 0)
-        atOnce = std::min<std::uint64_t>(atOnce, static_cast<std::uint64_t>(table.mostAtOnce()));
+    const std::uint64_t atOnce = std::clamp<std::uint64_t>(room, 1, mostAtOnce(table));
     for (std::size_t first = 0; first < count; first += atOnce) {
         const std::size_t end = std::min<std::size_t>(first + atOnce, count);
         std::vector<Result<void>> done(end - first);

@@ -126,6 +126,11 @@ struct ViewChange {
     std::unique_ptr<ViewTable> table,
     std::function<void(std::size_t index, const ReferenceView& view)> look);
 
+/// Memory that forEachView() takes at most for such work on each view, and what work on all of them
+/// at once takes (checkPeak()), their images included, bytes.
+[[nodiscard]] std::uint64_t memoryOfEach(const ViewTable& table, const PeakMemory& work);
+[[nodiscard]] std::uint64_t memoryOfAll(const ViewTable& table, const PeakMemory& work);
+
 /// Goes through all views, in rounds of as many at a time as there are threads and as the memory
 /// limit has room for: `each` is called with a view from several threads, then `inOrder`, if any,
 /// for the views of the round one after the other, in their order. Views are given back after their

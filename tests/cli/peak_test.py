@@ -141,6 +141,36 @@ def many_views(args, folder):
 FEW = 200
 
 
+# What stx info --memory calls a command, and such a command.
+TOLD = {"convert -o NAME.exr": "convert {} -o OUT.exr", "convert -o NAME.mp4": "convert {} -o OUT.mp4",
+        "bake -o NAME.exr": "bake {} -o OUT.exr", "bake -o NAME.mp4": "bake {} -o OUT.mp4",
+        "extract -o FOLDER": "extract {} -o OUT", "sheet": "sheet {} -o OUT.png",
+        "render": "render {} -o OUT.png --eye 0.1,0,0 --target 0,0,-3 --size 64x64 --backend cpu",
+        "render --mode splat": "render {} -o OUT.png --eye 0.1,0,0 --target 0,0,-3 --size 64x64 --backend cpu --mode splat",
+        "pack": "pack {} -o OUT", "select": "select {} -o OUT.exr --count 1", "refine": "refine {} -o OUT.exr --with noise",
+        "extract -o NAME.ply": "extract {} -o OUT.ply", "extract -o NAME.ply --as splats": "extract {} -o OUT.ply --as splats",
+        "extract -o NAME.glb": "extract {} -o OUT.glb", "extract -o NAME.html": "extract {} -o OUT.html"}
+
+
+def above_info(args, folder):
+    """What takes more than stx info --memory says, of in.exr."""
+    wrong = []
+    found = json.loads(must([args.stx, "info", "in.exr", "--memory", "--threads", "2", "--format", "json"], folder).out)["memory"]
+    if {row["command"] for row in found["commands"]} != set(TOLD):
+        return ["stx info --memory has other commands than this test"]
+    for number, row in enumerate(found["commands"]):
+        if args.only not in "info " + row["command"]:
+            continue
+        words = TOLD[row["command"]].replace("OUT", f"told{number}").replace("{}", "in.exr").split()
+        peak = must([args.stx] + words + ["--threads", "2", "--max-memory", "16384"], folder).usage.ru_maxrss / 1024
+        most = row["bytes"] / (1 << 20) + PROGRAM
+        if args.measure:
+            print(f"info {row['command']:32} {most:6.0f} MiB at most, {peak:6.1f} taken", flush=True)
+        elif peak > most:
+            wrong.append(f"{row['command']}: {peak:.0f} MiB, stx info --memory says {most:.0f} with the program")
+    return wrong
+
+
 def from_few(args, folder):
     """What is not the same, or takes too much, of pictures of 36 views that do not fit memory."""
     wrong = []
@@ -205,6 +235,7 @@ def main():
                 text = done.err.decode("utf-8", "replace")
             if done.code != 0 or peak > limit + beside:
                 wrong.append(f"{name}: {peak} MiB at --max-memory {limit}: exit code {done.code} {text}")
+        wrong += above_info(args, folder)
         wrong += many_views(args, folder)
         wrong += from_few(args, folder)
     print("\n".join(wrong))

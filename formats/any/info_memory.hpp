@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "lib/base/job.hpp"
+#include "lib/model/view_table.hpp"
+
+namespace stx {
+
+/// The memory that each command takes at most on these views, by tools/schemas/info.schema.json, as
+/// its own check against the limit counts it (lib/model/peak_memory.hpp). Views on demand are read
+/// once, one for each thread, to find whether they would be refined. Errors: reading.
+[[nodiscard]] Result<nlohmann::ordered_json> memoryJson(const ViewTable& table, Job& job);
+
+/// Of views of which only the sizes are known, those of the field "views"; a set is all in memory.
+/// Errors (invalidInput): a size is not known.
+[[nodiscard]] Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views);
+
+/// The same for people, a row for each command.
+[[nodiscard]] std::string memoryText(const nlohmann::ordered_json& memory);
+
+}  // namespace stx
