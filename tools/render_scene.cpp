@@ -9,6 +9,7 @@
 #include "lib/model/median_distance.hpp"
 #include "lib/model/peak_memory.hpp"
 #include "lib/model/splat_cloud.hpp"
+#include "lib/render/factory.hpp"
 
 namespace stx::tools {
 namespace {
@@ -73,9 +74,7 @@ struct DrawingMemory {
     std::uint64_t pixels = 0;
     std::uint64_t inMemory = 0, fromSpool = 0;  ///< bytes
 
-    DrawingMemory(const ViewTable& table, RenderMode mode) {
-        const PeakMemory& drawing =
-            mode == RenderMode::splat ? peak::kSplatMode : peak::kSurfaceMode;
+    DrawingMemory(const ViewTable& table, const PeakMemory& drawing) {
         std::uint64_t most = 0;  // of a view
         for (std::size_t i = 0; i < table.count(); ++i) {
             const std::uint64_t own = table.pixelsOf(i);
@@ -92,13 +91,14 @@ struct DrawingMemory {
 
 /// Opens what stands still. Views that would take more memory than there may be go into `spool`,
 /// from which a picture takes a quarter to a half more time (64 views of 1024x1024).
-Result<Model> openStill(const RenderOptions& o, std::unique_ptr<FileSpool>& spool, Job& job) {
+Result<Model> openStill(const RenderOptions& o, const PeakMemory& drawing,
+                        std::unique_ptr<FileSpool>& spool, Job& job) {
     STX_TRY(const auto kind, recognise(o.input));
     if (!o.open.set.from.empty() || (kind != FileKind::exr && kind != FileKind::mpeg4))
         return stx::open(o.input, o.open, job);
     STX_TRY(auto opened, openMeshOrViews(o.input, o.open, job));
     auto& table = std::get<std::unique_ptr<ViewTable>>(opened);
-    const DrawingMemory takes(*table, o.settings.mode);
+    const DrawingMemory takes(*table, drawing);
     const std::uint64_t limit = job.limits.maxMemoryBytes;
     if (table->whole() || takes.inMemory <= limit || takes.inMemory <= takes.fromSpool) {
         STX_TRY(auto bundle, wholeBundle(std::move(table), job));
@@ -135,7 +135,7 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
         noteUnused(Bundle(), o, command, program);
         return scene;
     }
-    STX_TRY(scene.model, openStill(o, scene.spool, program.job));
+    STX_TRY(scene.model, openStill(o, drawingMemory(settings), scene.spool, program.job));
     noteUnused(scene.model, o, command, program);
     const auto addViews = [&](const auto& seen) -> Result<void> {
         for (const auto& v : seen.views) scene.context.views.push_back(v.camera);

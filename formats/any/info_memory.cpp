@@ -29,6 +29,8 @@ constexpr ViewCommand kCommands[] = {
     {"sheet", &peak::kSheet, &peak::kSheet, true},
     {"render", &peak::kSurfaceMode, &peak::kSurfaceMode, false},
     {"render --mode splat", &peak::kSplatMode, &peak::kSplatMode, false},
+    {"render --light", &peak::kLitSurfaceMode, &peak::kSurfaceMode, false},
+    {"render --mode splat --light", &peak::kLitSplatMode, &peak::kSplatMode, false},
     {"pack", &peak::kAtlas, &peak::kAtlas, false},
     {"select", &peak::kSelect, &peak::kSelect, false},
     {"refine", &peak::kRefine, &peak::kRefine, false},

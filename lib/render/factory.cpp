@@ -1,6 +1,5 @@
 #include "lib/render/factory.hpp"
 
-#include "lib/model/peak_memory.hpp"
 #include "lib/render/compose/behind.hpp"
 #include "lib/render/compose/environment_behind.hpp"
 #include "lib/render/compose/fallback.hpp"
@@ -214,12 +213,17 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
 
 }  // namespace
 
+const PeakMemory& drawingMemory(const RenderSettings& settings) {
+    const bool lit = settings.wantNormals();
+    if (settings.mode == RenderMode::splat) return lit ? peak::kLitSplatMode : peak::kSplatMode;
+    return lit ? peak::kLitSurfaceMode : peak::kSurfaceMode;
+}
+
 Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bundle,
                                                const RenderSettings& settings, int device,
                                                Job& job) {
     STX_CHECK(bundle.check());
-    STX_CHECK(checkPeak(settings.mode == RenderMode::splat ? peak::kSplatMode : peak::kSurfaceMode,
-                        bundle.views, job.limits));
+    STX_CHECK(checkPeak(drawingMemory(settings), bundle.views, job.limits));
     return makeFrom(backend, bundle, settings, bundle.environment, device, job);
 }
 

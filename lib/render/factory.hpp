@@ -6,6 +6,7 @@
 #include "lib/base/job.hpp"
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/render/api/renderer.hpp"
 
 namespace stx {
@@ -17,6 +18,8 @@ namespace stx {
 [[nodiscard]] Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bundle,
                                                              const RenderSettings& settings,
                                                              int device, Job& job);
+/// What drawing a bundle so takes beside its images.
+[[nodiscard]] const PeakMemory& drawingMemory(const RenderSettings& settings);
 /// The same of a bundle in a spool, which must outlive the renderer: what is made of its pixels is
 /// kept there, too. Errors beside those: (invalidInput) captured views to refine side by side that
 /// take more memory than the limit.

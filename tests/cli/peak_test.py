@@ -136,9 +136,9 @@ def many_views(args, folder):
     return wrong
 
 
-# Of pictures of 48 views of 512²: MiB that they may take, the program and its pictures included. A 32nd is for pixels
-# of views, of less than two; in memory they take 236 to 498.
-FEW = 200
+# Of pictures of 36 views of 512² under a limit for less than a half of them, MiB: what they may take, the program and its
+# pictures included. In memory they take 190 to 410.
+FEW_LIMIT, FEW = 80, 200
 
 
 # What stx info --memory calls a command, and such a command.
@@ -147,6 +147,8 @@ TOLD = {"convert -o NAME.exr": "convert {} -o OUT.exr", "convert -o NAME.mp4": "
         "extract -o FOLDER": "extract {} -o OUT", "sheet": "sheet {} -o OUT.png",
         "render": "render {} -o OUT.png --eye 0.1,0,0 --target 0,0,-3 --size 64x64 --backend cpu",
         "render --mode splat": "render {} -o OUT.png --eye 0.1,0,0 --target 0,0,-3 --size 64x64 --backend cpu --mode splat",
+        "render --light": "render {} -o OUT.png --eye 0.1,0,0 --target 0,0,-3 --size 64x64 --backend cpu --light dir:0,0,-1",
+        "render --mode splat --light": "render {} -o OUT.png --eye 0.1,0,0 --target 0,0,-3 --size 64x64 --backend cpu --mode splat --light dir:0,0,-1",
         "pack": "pack {} -o OUT", "select": "select {} -o OUT.exr --count 1", "refine": "refine {} -o OUT.exr --with noise",
         "extract -o NAME.ply": "extract {} -o OUT.ply", "extract -o NAME.ply --as splats": "extract {} -o OUT.ply --as splats",
         "extract -o NAME.glb": "extract {} -o OUT.glb", "extract -o NAME.html": "extract {} -o OUT.html"}
@@ -181,7 +183,7 @@ def from_few(args, folder):
                 continue
             line = f"render many36.{kind} --orbit 3 --elevation 20 --size 512x512 --backend cpu --threads 2 {options}".split()
             every = must([args.stx] + line + ["-o", "all_%d.png"], folder)
-            few = must([args.stx] + line + ["-o", "few_%d.png", "--max-memory", str(FEW)], folder)
+            few = must([args.stx] + line + ["-o", "few_%d.png", "--max-memory", str(FEW_LIMIT)], folder)
             pictures = [open(os.path.join(folder, f"{which}_{i}.png"), "rb").read() for which in ("all", "few") for i in range(3)]
             peak = few.usage.ru_maxrss / 1024
             if args.measure:
