@@ -386,6 +386,58 @@ Result<Json> describeNumbered(const fs::path& path, const InfoOptions& options, 
     return out;
 }
 
+Result<void> describeMesh(const fs::path& path, const InfoOptions& options, Json& out, Job& job) {
+    if (options.agreement)
+        return fail(ErrorCode::usage,
+                    "'{}' is a mesh, which has no views that could agree; leave out "
+                    "--agreement",
+                    path.string());
+    if (options.memory)
+        return fail(ErrorCode::usage,
+                    "'{}' is a mesh; what its views take depends on --views and --size of "
+                    "stx convert; leave out --memory",
+                    path.string());
+    STX_TRY(const auto mesh, readMesh(path, job));
+    out["container"] = "mesh";
+    out["triangles"] = mesh.triangles.size();
+    out["vertices"] = mesh.positions.size();
+    out["points"] = mesh.points.size();
+    out["materials"] = mesh.materials.size();
+    auto textures = Json::array();
+    for (const auto& t : mesh.textures)
+        textures.push_back(
+            {{"attribute", "colour"}, {"width", t.pixels.width()}, {"height", t.pixels.height()}});
+    out["textures"] = std::move(textures);
+    if (mesh.splats) out["splats"] = splatsJson(*mesh.splats);
+    addOrigin(out, mesh.origin);
+    out["bounds"] = boundsJson(mesh.bounds(), mesh.origin);
+    return {};
+}
+
+/// What takes more than headers: what of the pixels was asked for.
+Result<void> addMeasured(const fs::path& path, FileKind kind, const InfoOptions& options,
+                         const OpenOptions& open, Json& out, Job& job) {
+    const bool bounds = options.bounds && (!out.contains("bounds") || !out.contains("points"));
+    if (bounds || options.agreement) {
+        STX_TRY(const auto bundle, openBundle(path, open, job));
+        if (bounds) addFromPixels(out, bundle);
+        // An import names views that are off by itself.
+        if (options.agreement)
+            out["agreement"] = agreementJson(bundle, out["container"] != "imageset", job);
+    }
+    if (options.memory) {
+        auto memory = [&]() -> Result<Json> {
+            const bool onDemand = kind == FileKind::mpeg4 || out["container"] == "exr";
+            if (!onDemand) return memoryOfSizes(out["views"]);
+            STX_TRY(const auto table, openViews(path, open, job));
+            return memoryJson(*table, job);
+        }();
+        if (!memory) return tl::unexpected(memory.error().at(fmt::format("'{}'", path.string())));
+        out["memory"] = *std::move(memory);
+    }
+    return {};
+}
+
 }  // namespace
 
 Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job) {
@@ -411,34 +463,9 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
         case FileKind::atlas:
             STX_CHECK(describeAtlas(path, options.object, out, job));
             break;
-        case FileKind::mesh: {
-            if (options.agreement)
-                return fail(ErrorCode::usage,
-                            "'{}' is a mesh, which has no views that could agree; leave out "
-                            "--agreement",
-                            path.string());
-            if (options.memory)
-                return fail(ErrorCode::usage,
-                            "'{}' is a mesh; what its views take depends on --views and --size of "
-                            "stx convert; leave out --memory",
-                            path.string());
-            STX_TRY(const auto mesh, readMesh(path, job));
-            out["container"] = "mesh";
-            out["triangles"] = mesh.triangles.size();
-            out["vertices"] = mesh.positions.size();
-            out["points"] = mesh.points.size();
-            out["materials"] = mesh.materials.size();
-            auto textures = Json::array();
-            for (const auto& t : mesh.textures)
-                textures.push_back({{"attribute", "colour"},
-                                    {"width", t.pixels.width()},
-                                    {"height", t.pixels.height()}});
-            out["textures"] = std::move(textures);
-            if (mesh.splats) out["splats"] = splatsJson(*mesh.splats);
-            addOrigin(out, mesh.origin);
-            out["bounds"] = boundsJson(mesh.bounds(), mesh.origin);
+        case FileKind::mesh:
+            STX_CHECK(describeMesh(path, options, out, job));
             return out;
-        }
         case FileKind::imageSet:
         case FileKind::photo:
             STX_CHECK(describeSet(path, out, job));
@@ -451,24 +478,7 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
                         "with depth",
                         path.string());
     }
-    const bool bounds = options.bounds && (!out.contains("bounds") || !out.contains("points"));
-    if (bounds || options.agreement) {
-        STX_TRY(const auto bundle, openBundle(path, open, job));
-        if (bounds) addFromPixels(out, bundle);
-        // An import names views that are off by itself.
-        if (options.agreement)
-            out["agreement"] = agreementJson(bundle, out["container"] != "imageset", job);
-    }
-    if (options.memory) {
-        auto memory = [&]() -> Result<Json> {
-            const bool onDemand = kind == FileKind::mpeg4 || out["container"] == "exr";
-            if (!onDemand) return memoryOfSizes(out["views"]);
-            STX_TRY(const auto table, openViews(path, open, job));
-            return memoryJson(*table, job);
-        }();
-        if (!memory) return tl::unexpected(memory.error().at(fmt::format("'{}'", path.string())));
-        out["memory"] = *std::move(memory);
-    }
+    STX_CHECK(addMeasured(path, kind, options, open, out, job));
     return out;
 }
 
