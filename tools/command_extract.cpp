@@ -136,6 +136,52 @@ Result<void> checkOptions(const ExtractOptions& o, const Wanted& w, const Comman
     return {};
 }
 
+/// What was written: "7 views of 3 frames".
+struct Extracted {
+    std::string what;
+    std::size_t views = 0;
+    std::int64_t points = 0;
+};
+
+Result<Extracted> extractPoints(const ExtractOptions& o, const PeakMemory& takes, Sequence& frames,
+                                std::size_t moment, Program& program) {
+    STX_TRY(const auto bundle, frames.frame(moment, program.job));
+    STX_CHECK(checkPeak(takes, bundle.views, program.job.limits));
+    const auto found = pointsOf(bundle);
+    PointCloud cloud;
+    cloud.positions = found.positions;
+    cloud.colours = found.colours;
+    cloud.normals = found.normals;
+    cloud.origin = bundle.origin;
+    PointWriteOptions write = o.points;
+    write.file.noClobber = program.common.noClobber;
+    STX_CHECK(writePoints(o.output, cloud, program.job, write));
+    return Extracted{counted(found.positions.size(), "point"), bundle.views.size(),
+                     bundle.pointCount()};
+}
+
+Result<Extracted> extractFolder(const ExtractOptions& o, std::unique_ptr<Sequence> frames,
+                                std::size_t moment, Program& program) {
+    ExportOptions write;
+    write.kind = o.cameras == "miv"      ? ExportOptions::Kind::miv
+                 : o.cameras == "colmap" ? ExportOptions::Kind::colmap
+                                         : ExportOptions::Kind::transforms;
+    write.noClobber = program.common.noClobber;
+    write.depth = o.depth;
+    write.linearAsPng = o.colour == "png";
+    if (frames->timeline().moves() && o.time) {
+        STX_TRY(frames, someFrames(std::move(frames), {moment}));
+    }
+    const std::size_t count = frames->timeline().count();
+    keepFreedMemory();  // of a view, for the next one
+    ViewTally tally;
+    frames = tallied(std::move(frames), tally);
+    STX_CHECK(exportFrames(*frames, o.output, write, program.job));
+    Extracted out{counted(tally.views(), "view"), tally.views(), tally.points()};
+    if (count > 1) out.what += " of " + counted(count, "frame");
+    return out;
+}
+
 Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
     const Stopwatch watch;
     ExtractOptions o = options;
@@ -157,66 +203,31 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         return extractShown(o.input, o.open, o.output, o.time, o.refine, modelOf(o), program);
     // Other programs' workspaces have pictures of 8 bits.
     o.open.set.deepColour = !wanted.points && o.cameras == "transforms";
-    const bool points = wanted.points, draco = wanted.ending == ".drc";
+    const PeakMemory& takes = !wanted.points            ? peak::kExport
+                              : wanted.ending == ".drc" ? peak::kPointsDraco
+                                                        : peak::kPoints;
     STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
-    STX_TRY(frames, refined(std::move(frames), o.refine,
-                            !points ? peak::kExport
-                            : draco ? peak::kPointsDraco
-                                    : peak::kPoints));
-    const Timeline timeline = frames->timeline();
+    STX_TRY(frames, refined(std::move(frames), o.refine, takes));
     STX_TRY(const std::size_t moment,
-            momentOf(o.time, timeline, points ? "points are" : nullptr, o.input, program.job));
-    std::string what;
-    std::size_t views = 0;
-    std::int64_t pointCount = 0;
-    if (points) {
-        STX_TRY(const auto bundle, frames->frame(moment, program.job));
-        views = bundle.views.size();
-        pointCount = bundle.pointCount();
-        STX_CHECK(checkPeak(draco ? peak::kPointsDraco : peak::kPoints, bundle.views,
-                            program.job.limits));
-        const auto found = pointsOf(bundle);
-        PointCloud cloud;
-        cloud.positions = found.positions;
-        cloud.colours = found.colours;
-        cloud.normals = found.normals;
-        cloud.origin = bundle.origin;
-        PointWriteOptions write = o.points;
-        write.file.noClobber = program.common.noClobber;
-        STX_CHECK(writePoints(o.output, cloud, program.job, write));
-        what = counted(found.positions.size(), "point");
+            momentOf(o.time, frames->timeline(), wanted.points ? "points are" : nullptr, o.input,
+                     program.job));
+    Extracted out;
+    if (wanted.points) {
+        STX_TRY(out, extractPoints(o, takes, *frames, moment, program));
     } else {
-        ExportOptions write;
-        write.kind = o.cameras == "miv"      ? ExportOptions::Kind::miv
-                     : o.cameras == "colmap" ? ExportOptions::Kind::colmap
-                                             : ExportOptions::Kind::transforms;
-        write.noClobber = program.common.noClobber;
-        write.depth = o.depth;
-        write.linearAsPng = o.colour == "png";
-        if (timeline.moves() && o.time) {
-            STX_TRY(frames, someFrames(std::move(frames), {moment}));
-        }
-        const std::size_t count = frames->timeline().count();
-        keepFreedMemory();  // of a view, for the next one
-        ViewTally tally;
-        frames = tallied(std::move(frames), tally);
-        STX_CHECK(exportFrames(*frames, o.output, write, program.job));
-        views = tally.views();
-        pointCount = tally.points();
-        what = counted(views, "view");
-        if (count > 1) what += " of " + counted(count, "frame");
+        STX_TRY(out, extractFolder(o, std::move(frames), moment, program));
     }
     const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} ({}) → {} ({}), {}, {}",
                             std::filesystem::path(o.input).filename().string(),
                             humanBytes(bytesOf(o.input)), o.output, humanBytes(bytesOf(o.output)),
-                            what, humanSeconds(seconds)));
+                            out.what, humanSeconds(seconds)));
     STX_CHECK(program.writeReport({{"$schema", "extract-report.schema.json"},
                                    {"input", o.input},
                                    {"output", o.output},
-                                   {"views", views},
-                                   {"points", pointCount},
+                                   {"views", out.views},
+                                   {"points", out.points},
                                    {"seconds", seconds}}));
     return 0;
 }
