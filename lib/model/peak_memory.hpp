@@ -32,7 +32,7 @@ inline constexpr PeakMemory kFewerSplats = {"merging splats", 140};
 inline constexpr PeakMemory kFewerTriangles = {"fewer triangles", 228};
 // With normals that are made for light.
 inline constexpr PeakMemory kLitSplatMode = {"drawing lit splats", 20};
-inline constexpr PeakMemory kLitSurfaceMode = {"drawing in light", 34};
+inline constexpr PeakMemory kLitSurfaceMode = {"drawing in light", 44};
 inline constexpr PeakMemory kMpeg4 = {"writing MPEG-4", 16};
 inline constexpr PeakMemory kMpeg4Vectors = {"writing MPEG-4", 40};
 inline constexpr PeakMemory kPage = {"a page", 36};
