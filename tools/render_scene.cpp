@@ -66,31 +66,12 @@ Result<SwayPose> swayPose(const RenderOptions& o, Sequence& frames, const Job& j
 /// the rest is what preparing takes.
 constexpr std::uint64_t kBudgetPart = 32;
 /// What drawing from a spool takes beside that, bytes: for each pixel of all views what is known of
-/// blocks, and for each of the view that a thread prepares.
-constexpr std::uint64_t kKnown = 2, kPreparing = 40;
-
-/// Memory that drawing the views of a table takes.
-struct DrawingMemory {
-    std::uint64_t pixels = 0;
-    std::uint64_t inMemory = 0, fromSpool = 0;  ///< bytes
-
-    DrawingMemory(const ViewTable& table, const PeakMemory& drawing) {
-        std::uint64_t most = 0;  // of a view
-        for (std::size_t i = 0; i < table.count(); ++i) {
-            const std::uint64_t own = table.pixelsOf(i);
-            pixels += own;
-            inMemory += table.bytesOf(i) + drawing.perPixel * own;
-            most = std::max(most, std::max(table.bytesToMake(i), kPreparing * own));
-        }
-        const auto atOnce =
-            std::min(static_cast<std::uint64_t>(threadCount()), std::uint64_t{table.count()});
-        const std::uint64_t beside = atOnce * most + kKnown * pixels;
-        fromSpool = beside + beside / (kBudgetPart - 1);
-    }
-};
+/// blocks, and beside its images for each of the view that a thread prepares.
+constexpr std::uint64_t kKnown = 2;
+constexpr PeakMemory kPreparing = {"drawing", 32};
 
 /// Opens what stands still. Views that would take more memory than there may be go into `spool`,
-/// from which a picture takes a quarter to a half more time (64 views of 1024x1024).
+/// from which a picture takes 7 to 30 % more time of processors (64 views of 1024x1024).
 Result<Model> openStill(const RenderOptions& o, const PeakMemory& drawing,
                         std::unique_ptr<FileSpool>& spool, Job& job) {
     STX_TRY(const auto kind, recognise(o.input));
@@ -98,13 +79,16 @@ Result<Model> openStill(const RenderOptions& o, const PeakMemory& drawing,
         return stx::open(o.input, o.open, job);
     STX_TRY(auto opened, openMeshOrViews(o.input, o.open, job));
     auto& table = std::get<std::unique_ptr<ViewTable>>(opened);
-    const DrawingMemory takes(*table, drawing);
-    const std::uint64_t limit = job.limits.maxMemoryBytes;
-    if (table->whole() || takes.inMemory <= limit || takes.inMemory <= takes.fromSpool) {
+    const std::uint64_t limit = job.limits.maxMemoryBytes, inMemory = memoryOfAll(*table, drawing);
+    std::uint64_t pixels = 0;
+    for (std::size_t i = 0; i < table->count(); ++i) pixels += table->pixelsOf(i);
+    const std::uint64_t beside = memoryOfEach(*table, kPreparing) + kKnown * pixels;
+    const std::uint64_t fromSpool = beside + beside / (kBudgetPart - 1);
+    if (table->whole() || inMemory <= limit || inMemory <= fromSpool) {
         STX_TRY(auto bundle, wholeBundle(std::move(table), job));
         return Model(std::move(bundle));
     }
-    STX_CHECK(checkPeak({"drawing", 0}, takes.pixels, 0, takes.fromSpool, job.limits));
+    STX_CHECK(checkPeak({kPreparing.what, 0}, pixels, 0, fromSpool, job.limits));
     STX_TRY(spool, FileSpool::create(o.output == "-" ? std::filesystem::temp_directory_path()
                                                      : folderOf(o.output),
                                      limit / kBudgetPart));

@@ -142,7 +142,7 @@ FEW_LIMIT, FEW = 80, 200
 
 
 # What stx info --memory calls a command, and such a command.
-TOLD = {"convert -o NAME.exr": "convert {} -o OUT.exr", "convert -o NAME.mp4": "convert {} -o OUT.mp4",
+INFO_COMMANDS = {"convert -o NAME.exr": "convert {} -o OUT.exr", "convert -o NAME.mp4": "convert {} -o OUT.mp4",
         "bake -o NAME.exr": "bake {} -o OUT.exr", "bake -o NAME.mp4": "bake {} -o OUT.mp4",
         "extract -o FOLDER": "extract {} -o OUT", "sheet": "sheet {} -o OUT.png",
         "render": "render {} -o OUT.png --eye 0.1,0,0 --target 0,0,-3 --size 64x64 --backend cpu",
@@ -158,12 +158,12 @@ def above_info(args, folder):
     """What takes more than stx info --memory says, of in.exr."""
     wrong = []
     found = json.loads(must([args.stx, "info", "in.exr", "--memory", "--threads", "2", "--format", "json"], folder).out)["memory"]
-    if {row["command"] for row in found["commands"]} != set(TOLD):
+    if {row["command"] for row in found["commands"]} != set(INFO_COMMANDS):
         return ["stx info --memory has other commands than this test"]
     for number, row in enumerate(found["commands"]):
         if args.only not in "info " + row["command"]:
             continue
-        words = TOLD[row["command"]].replace("OUT", f"told{number}").replace("{}", "in.exr").split()
+        words = INFO_COMMANDS[row["command"]].replace("OUT", f"listed{number}").replace("{}", "in.exr").split()
         peak = must([args.stx] + words + ["--threads", "2", "--max-memory", "16384"], folder).usage.ru_maxrss / 1024
         most = row["bytes"] / (1 << 20) + PROGRAM
         if args.measure:

@@ -77,7 +77,7 @@ TEST(DepthDisagreement, FindsACameraThatIsNotWhereItsPoseSays) {
         EXPECT_EQ(found.views[v].disagrees(), v == kWrong) << v << ": " << found.views[v].relative;
 }
 
-// What a code rounds off and what is less than half a pixel is no disagreement.
+// What a code rounds off and what is less than half a pixel does not count.
 TEST(DepthDisagreement, LeavesWhatCodesAndPixelsRoundOff) {
     Bundle bundle = exactViews(AnalyticScene::room);
     for (ReferenceView& view : bundle.views) {
