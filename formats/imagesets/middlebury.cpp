@@ -81,7 +81,7 @@ struct NumberedPicture {
 
 /// See SetView::shift, of view `number`. Integers may have been cut off, but not by more than half
 /// a step either way from where they are.
-auto shiftBy(std::vector<NumberedPicture> pictures, int number, double scale) {
+auto shiftBy(const std::vector<NumberedPicture>& pictures, int number, double scale) {
     return [=](const Image<float>& values, const Texture& texture, Job& job) {
         std::vector<SidePicture> beside;
         for (const NumberedPicture& p : pictures) {
