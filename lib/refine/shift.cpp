@@ -61,14 +61,15 @@ float between(const float* row, double x) {
                             t * (3 * (p[1] - p[2]) + p[3] - p[0])));
 }
 
-struct Point {
+struct TexturedPixel {
     int x, y;
 };
 
 /// Where textures inside surfaces are, so far from the sides that all pictures show them.
-std::vector<Point> texturedPoints(const Image<float>& disparities, const Image<float>& detail,
-                                  std::span<const SidePicture> beside, double most) {
-    std::vector<Point> points;
+std::vector<TexturedPixel> texturedPoints(const Image<float>& disparities,
+                                          const Image<float>& detail,
+                                          std::span<const SidePicture> beside, double most) {
+    std::vector<TexturedPixel> points;
     const auto inside = [&](int x, int y, float d) {
         const auto same = [&](int u, int v) {
             const float there = disparities.at(u, v);
@@ -106,7 +107,7 @@ double disparityShift(const Image<float>& disparities, const Texture& texture,
     parallelFor(0, static_cast<std::int64_t>(differences.size()), [&](std::int64_t n) {
         const double shift = most * static_cast<double>(n - kTries) / kTries;
         double sum = 0;
-        for (const Point& p : points) {
+        for (const TexturedPixel& p : points) {
             const double d = disparities.at(p.x, p.y) + shift;
             for (std::size_t k = 0; k < others.size(); ++k) {
                 const float there = between(others[k].row(p.y).data(), p.x - beside[k].steps * d);

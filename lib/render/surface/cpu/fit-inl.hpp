@@ -31,7 +31,7 @@ struct Taps {
     V xu, xv, yu, yv;
     V du[T], dv[T];
 
-    HWY_INLINE Taps(D d, const View& view, const Lanes& baseU, const Lanes& baseV, int l) {
+    HWY_INLINE Taps(D d, const GroupSource& view, const Lanes& baseU, const Lanes& baseV, int l) {
         const V half = hn::Set(d, 0.5f);
         du[0] = hn::Sub(hn::Add(hn::LoadU(d, &baseU[l]), half), hn::LoadU(d, &view.u[l]));
         dv[0] = hn::Sub(hn::Add(hn::LoadU(d, &baseV[l]), half), hn::LoadU(d, &view.v[l]));

@@ -17,7 +17,7 @@ struct alignas(64) Lanes {
 };
 
 /// One source under a group of pieces.
-struct View {
+struct GroupSource {
     Lanes u, v;            ///< position in the source, pixels
     Lanes xu, xv, yu, yv;  ///< d(x, y in the frame) / d(u, v)
     Lanes weight;

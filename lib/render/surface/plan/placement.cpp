@@ -49,7 +49,7 @@ bool isTurnedAway(const Source& s, const BlockRange& block, int x, int y, const 
 /// compilers make vectors of it.
 struct Corners {
     std::array<float, 8> x, y, w;  ///< homogeneous
-    struct Box {
+    struct DrawnBounds {
         float x0 = std::numeric_limits<float>::max(), y0 = x0, x1 = -x0, y1 = -x0;
 
         void add(float x, float y) {
@@ -73,7 +73,7 @@ struct Corners {
         }
     }
     /// Where they are when all are in front of the camera.
-    [[nodiscard]] Box all() const {
+    [[nodiscard]] DrawnBounds all() const {
         std::array<float, 8> u, v;
         for (std::size_t k = 0; k < 8; ++k) {
             u[k] = x[k] / w[k];
@@ -85,8 +85,8 @@ struct Corners {
     }
     /// The box of the part that is in front of the camera: edges that go behind it are cut off
     /// where their depth is `cut`.
-    [[nodiscard]] Box inFront(float cut) const {
-        Box box;
+    [[nodiscard]] DrawnBounds inFront(float cut) const {
+        DrawnBounds box;
         for (std::size_t k = 0; k < 8; ++k) {
             if (w[k] > 0) box.add(x[k] / w[k], y[k] / w[k]);
             for (const std::size_t bit : {1u, 2u, 4u}) {
