@@ -20,9 +20,10 @@ constexpr float kTexture = 0.03f;
 constexpr int kEvery = 2;
 /// Disparities of neighbours inside a surface differ by less; pixels.
 constexpr float kInsideSurface = 0.75f;
-/// Larger differences count as this large: what is hidden there.
+/// Differences of brightness count as this large at most: larger ones come from places that are
+/// hidden there.
 constexpr float kMostDifference = 0.08f;
-/// Shifts that are tried, on each side of none.
+/// The number of shifts that are tried on each side of 0.
 constexpr int kTries = 12;
 /// The best must leave less than this share of the differences; fewer points tell nothing.
 constexpr double kBetter = 0.98;
@@ -51,7 +52,7 @@ Image<float> detailOf(const Texture& texture) {
     return detail;
 }
 
-/// Between four pixels of a row, x >= 1 and < width - 2 (Catmull and Rom).
+/// Interpolates a row at x by Catmull and Rom, x >= 1 and < width - 2.
 float between(const float* row, double x) {
     const int left = static_cast<int>(x);
     const float *p = row + left - 1, t = static_cast<float>(x - left);

@@ -14,7 +14,7 @@ namespace stx {
 namespace surface {
 namespace {
 
-/// The squares that those pixels and the pixels beside them are in.
+/// Which squares of the tile hold these pixels or a pixel beside them.
 Squares squaresOf(const TilePixels& pixels) {
     Squares squares = 0;
     for (std::size_t y = 0; y < kTile; ++y) {
@@ -103,7 +103,7 @@ class TileDrawer {
         }
     }
 
-    /// The surfaces that each pixel shows, of a frame of that size.
+    /// Finds the surfaces that each pixel shows. The frame has this size, pixels.
     void makePieces(int width, int height) {
         pieces_.clear();
         const DepthAxis& axis = frame_->space.axis;
@@ -115,7 +115,8 @@ class TileDrawer {
             fuseTile(local_, grid(), axis, tileX, tileY, columns, rows, pieces_, nullptr, core);
             return;
         }
-        // First one sample for each pixel; all of them only where that does not tell.
+        // One sample for each pixel is drawn first; where it does not settle the pixel, all of
+        // them.
         drawSources(kMiddles, {kAllSquares, true, {}, {}});
         const TilePixels open = fuseSettled(local_, axis, tileX, tileY, columns, rows,
                                             frame_->effort.samplesPerPixel, pieces_);
@@ -125,7 +126,8 @@ class TileDrawer {
         }
     }
 
-    /// Colours by the share of each piece; depth and origin of a pixel are those of its largest.
+    /// Adds the colours of the pieces, each by its share of the pixel. The depth and the origin of
+    /// a pixel are those of its largest piece.
     void addPiecesTo(DrawnFrame& out) const {
         const int tileX = frame_->tileX(tile_), tileY = frame_->tileY(tile_);
         std::array<float, kTile * kTile> mainShare{};

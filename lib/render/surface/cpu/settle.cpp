@@ -31,7 +31,7 @@ struct Settler {
     int perPixel;
     TileMiddles& out;
 
-    /// What a share of depth is of, in q.
+    /// The q by which a share of the depth is multiplied.
     template <class D, class V>
     HWY_INLINE V scaleOf(D d, V q) const {
         return axis.inverse ? q : hn::Set(d, 1.0f);

@@ -168,7 +168,7 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
     const Rgba8Image* bytes = taps.page->texture->rgba8();
     if (taps.stepX == 1 && baseU >= taps.x0 && baseV >= taps.y0 && baseU + kTaps <= taps.x1 &&
         baseV + kTaps <= taps.y1 && (bytes || !source.hasAlpha)) {
-        // The same, a row of taps at once.
+        // The same for a row of taps at once.
         const hn::FixedTag<float, kTaps> d;
         const hn::RebindToSigned<decltype(d)> di;
         const auto far = hn::Set(d, kFarthestTap * scale), limit = hn::Set(d, allowed);
@@ -264,7 +264,7 @@ HWY_INLINE void placeSources(const Group& g, std::span<const ShadeSource> source
     }
 }
 
-/// The source of the most weight in each lane, -1 = none.
+/// The source that weighs most in each lane, -1 = none.
 HWY_INLINE void findBest(const Group& g, const GroupTaps& t, std::int8_t* best) {
     alignas(64) std::int32_t top[kGroup];
     Lanes topWeight;
@@ -310,7 +310,7 @@ HWY_INLINE void keepHeaviest(const Group& g, int most, GroupTaps& t) {
                        &weights[l]);
         }
     }
-    // Neighbours mostly leave out the same sources.
+    // Neighbouring pieces mostly leave out the same sources.
     const auto used = [&](int s) {
         const GroupSource& view = t.views[s];
         for (int l = 0; l < g.count; ++l)

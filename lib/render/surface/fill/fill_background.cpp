@@ -138,7 +138,7 @@ void putAverage(const Image<glm::vec4>& before, const OpenFrame& filled, int fac
     });
 }
 
-/// 0 up to `t` = 0, 1 from `t` = 1 on.
+/// Goes smoothly from 0 at `t` = 0 to 1 at `t` = 1.
 float smoothStep(float t) {
     t = std::clamp(t, 0.0f, 1.0f);
     return t * t * (3 - 2 * t);
@@ -168,7 +168,7 @@ bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, con
     const auto [farthest, nearest] = std::minmax_element(qs.begin(), qs.begin() + count);
     const float front = *nearest;
     const float range = front - *farthest + kLeastRange * frame.space.axis.relativeScale(front);
-    // All at once in vectors.
+    // Separate loops, of which compilers make vectors.
     for (std::size_t k = 0; k < count; ++k) {
         const float behind = (front - qs[k]) / range + kNearestWeight;
         weights[k] = behind * behind / (weights[k] * std::sqrt(weights[k]));
