@@ -81,7 +81,7 @@ struct NumberedPicture {
 
 /// See SetView::shift, of view `number`. Integers may have been cut off, which takes half a step in
 /// the mean, and rectified pictures lie a little beside each other: a step either way at most.
-auto shiftBy(std::vector<NumberedPicture> pictures, int number, double scale) {
+auto shiftBy(const std::vector<NumberedPicture>& pictures, int number, double scale) {
     return [=](const Image<float>& values, const Texture& texture, Job& job) {
         std::vector<SidePicture> beside;
         std::optional<std::size_t> first;  // of those beside

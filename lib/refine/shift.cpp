@@ -22,9 +22,10 @@ constexpr float kTexture = 0.03f;
 constexpr int kEvery = 2;
 /// Disparities of neighbours inside a surface differ by less; pixels.
 constexpr float kInsideSurface = 0.75f;
-/// Larger differences count as this large: what is hidden there.
+/// Differences of brightness count as this large at most: larger ones come from places that are
+/// hidden there.
 constexpr float kMostDifference = 0.08f;
-/// Shifts that are tried, on each side of none.
+/// The number of shifts that are tried on each side of 0.
 constexpr int kTries = 12;
 /// Rows lie beside each other by more than so many standard errors, and by 0.02 to 0.6 pixels:
 /// those of 2003 and 2005 by 0.1 (Dolls and Cones gain 0.2 dB); what is farther off is not
@@ -84,14 +85,15 @@ float inPicture(const Image<float>& picture, double x, int y, double down) {
     return between(column.data(), static_cast<float>(down - std::floor(down)));
 }
 
-struct Point {
+struct TexturedPixel {
     int x, y;
 };
 
 /// Where textures inside surfaces are, so far from the sides that all pictures show them.
-std::vector<Point> texturedPoints(const Image<float>& disparities, const Image<float>& detail,
-                                  std::span<const SidePicture> beside, double most) {
-    std::vector<Point> points;
+std::vector<TexturedPixel> texturedPoints(const Image<float>& disparities,
+                                          const Image<float>& detail,
+                                          std::span<const SidePicture> beside, double most) {
+    std::vector<TexturedPixel> points;
     const auto inside = [&](int x, int y, float d) {
         const auto same = [&](int u, int v) {
             const float there = disparities.at(u, v);
@@ -119,12 +121,13 @@ std::vector<Point> texturedPoints(const Image<float>& disparities, const Image<f
 /// differ least from `own`, each so much lower; 0 where that is not clear.
 double shiftAlongRows(const Image<float>& disparities, const Image<float>& own,
                       std::span<const Image<float>> others, std::span<const SidePicture> beside,
-                      std::span<const double> down, std::span<const Point> points, double most) {
+                      std::span<const double> down, std::span<const TexturedPixel> points,
+                      double most) {
     std::array<double, 2 * kTries + 1> differences{};
     parallelFor(0, static_cast<std::int64_t>(differences.size()), [&](std::int64_t n) {
         const double shift = most * static_cast<double>(n - kTries) / kTries;
         double sum = 0;
-        for (const Point& p : points) {
+        for (const TexturedPixel& p : points) {
             const double d = disparities.at(p.x, p.y) + shift;
             for (std::size_t k = 0; k < others.size(); ++k) {
                 const float there = inPicture(others[k], p.x - beside[k].steps * d, p.y, down[k]);
@@ -147,14 +150,14 @@ double shiftAlongRows(const Image<float>& disparities, const Image<float>& own,
 /// are solved for together, with the mean slopes of both pictures, which a shift of either leaves
 /// unbiased (Lucas & Kanade 1981).
 double rowsBeside(const Image<float>& own, const Image<float>& other, double steps, double shift,
-                  const Image<float>& disparities, std::span<const Point> points) {
+                  const Image<float>& disparities, std::span<const TexturedPixel> points) {
     glm::dvec2 beside(0);  // along, down
     double error = 0;
     for (int round = 0; round < kRowRounds; ++round) {
         glm::dmat2 normal(0);
         glm::dvec2 right(0);
         double left = 0, count = 0;
-        for (const Point& p : points) {
+        for (const TexturedPixel& p : points) {
             const auto there = [&](double along, double down) {
                 const double x = p.x - steps * (disparities.at(p.x, p.y) + shift) + beside.x;
                 return inPicture(other, std::clamp(x + along, 1.0, own.width() - 2.01), p.y,

@@ -79,7 +79,7 @@ struct SampleFuser {
         bool mayGiveWay = false;
     };
 
-    /// A lane's number for each point.
+    /// The lanes whose owner is source i.
     static HWY_INLINE PointMask isOwner(Counts owner, int i) {
         return hn::RebindMask(PointTag(), hn::Eq(owner, hn::Set(CountTag(), i)));
     }
