@@ -10,6 +10,7 @@
 #include "lib/base/stopwatch.hpp"
 #include "lib/refine/poses.hpp"
 #include "lib/registration/disagreement.hpp"
+#include "lib/render/factory.hpp"
 #include "tools/commands.hpp"
 #include "tools/refining.hpp"
 
@@ -86,7 +87,16 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
         });
     SaveOptions save;
     save.noClobber = program.common.noClobber;
-    STX_CHECK(saveSequence(*frames, o.output, save, program.job));
+    const bool still = timeline.count() == 1 && containerOf(o.output).value() == FileKind::exr;
+    if (still) {
+        STX_TRY(const auto table, frames->views(0, program.job));
+        // Nothing is left to do of them, so that not all need be there for a picture.
+        if (stepsOf(o) == "auto" && tellWithoutPixels(table->about().views))
+            save.summarise = summaryOfView;
+        STX_CHECK(saveViews(*table, o.output, save, program.job));
+    } else {
+        STX_CHECK(saveSequence(*frames, o.output, save, program.job));
+    }
     const RefineReport& report = refining.report();
     if (before) program.job.note("views that were refined before are left as they are");
     const double seconds = watch.seconds();

@@ -342,11 +342,7 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     STX_CHECK(checkCameras(pictures, program.job.limits));
     writing.rate = ownRate(o, scene, pictures, program.job).value_or(writing.rate);
     if (!scene.moving) {
-        STX_TRY(scene.still, scene.spool
-                                 ? makeRenderer(o.backend, std::get<Bundle>(scene.model),
-                                                *scene.spool, settings, o.device, program.job)
-                                 : rendererOf(std::move(scene.model), settings, program.job,
-                                              o.backend, o.device));
+        STX_CHECK(makeStill(o, settings, pictures, scene, program.job));
     }
     program.sayNotes();
 

@@ -1,6 +1,7 @@
 #include "tools/render_scene.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <type_traits>
 
 #include "formats/any/open.hpp"
@@ -70,30 +71,71 @@ constexpr std::uint64_t kBudgetPart = 32;
 constexpr std::uint64_t kKnown = 2;
 constexpr PeakMemory kPreparing = {"drawing", 32};
 
-/// Opens what stands still. Views that would take more memory than there may be go into `spool`,
+/// Reads those of `wanted`, into a spool where they would take more memory than there may be.
+Result<Bundle> readViews(const RenderOptions& o, const PeakMemory& drawing, const ViewTable& table,
+                         const std::vector<bool>& wanted,
+                         const std::function<Result<void>(std::size_t, const ReferenceView&)>& look,
+                         std::unique_ptr<FileSpool>& spool, Job& job) {
+    const std::uint64_t limit = job.limits.maxMemoryBytes;
+    std::uint64_t inMemory = 0, pixels = 0;
+    for (std::size_t i = 0; i < table.count(); ++i) {
+        if (!wanted[i]) continue;
+        inMemory += table.bytesOf(i) + drawing.perPixel * table.pixelsOf(i);
+        pixels += table.pixelsOf(i);
+    }
+    const std::uint64_t beside = memoryOfEach(table, kPreparing) + kKnown * pixels;
+    const std::uint64_t fromSpool = beside + beside / (kBudgetPart - 1);
+    if (inMemory > limit && inMemory > fromSpool) {
+        STX_CHECK(checkPeak({kPreparing.what, 0}, pixels, 0, fromSpool, job.limits));
+        STX_TRY(spool, FileSpool::create(o.output == "-" ? std::filesystem::temp_directory_path()
+                                                         : folderOf(o.output),
+                                         limit / kBudgetPart));
+    }
+    return someViews(table, wanted, spool.get(), job, look);
+}
+
+/// Whether the views of a table may be chosen by the pictures that are wanted: summaries tell of
+/// them, and nothing looks at all of them first.
+bool mayChoose(const RenderOptions& o, const RenderSettings& settings, const ViewTable& table) {
+    const bool refines = std::ranges::any_of(refineSteps(), [&](const RefineStepInfo& info) {
+        return settings.refine.of(info.step) == RefineSwitch::on;
+    });
+    return !o.around && !(o.camera.swayPercent > 0) && !refines && table.about().bounds &&
+           settings.mode == RenderMode::surface && !table.summaries().empty() &&
+           tellWithoutPixels(table.about().views);
+}
+
+/// Opens what stands still. Views that would take more memory than there may be go into a spool,
 /// from which a picture takes 7 to 30 % more time of processors (64 views of 1024x1024).
-Result<Model> openStill(const RenderOptions& o, const PeakMemory& drawing,
-                        std::unique_ptr<FileSpool>& spool, Job& job) {
+Result<void> openStill(const RenderOptions& o, const RenderSettings& settings, DrawnScene& scene,
+                       Job& job) {
     STX_TRY(const auto kind, recognise(o.input));
-    if (!o.open.set.from.empty() || (kind != FileKind::exr && kind != FileKind::mpeg4))
-        return stx::open(o.input, o.open, job);
+    if (!o.open.set.from.empty() || (kind != FileKind::exr && kind != FileKind::mpeg4)) {
+        STX_TRY(scene.model, stx::open(o.input, o.open, job));
+        return {};
+    }
     STX_TRY(auto opened, openMeshOrViews(o.input, o.open, job));
     auto& table = std::get<std::unique_ptr<ViewTable>>(opened);
-    const std::uint64_t limit = job.limits.maxMemoryBytes, inMemory = memoryOfAll(*table, drawing);
-    std::uint64_t pixels = 0;
-    for (std::size_t i = 0; i < table->count(); ++i) pixels += table->pixelsOf(i);
-    const std::uint64_t beside = memoryOfEach(*table, kPreparing) + kKnown * pixels;
-    const std::uint64_t fromSpool = beside + beside / (kBudgetPart - 1);
-    if (table->whole() || inMemory <= limit || inMemory <= fromSpool) {
-        STX_TRY(auto bundle, wholeBundle(std::move(table), job));
-        return Model(std::move(bundle));
+    if (mayChoose(o, settings, *table)) {
+        STX_TRY(scene.model,
+                someViews(*table, std::vector<bool>(table->count(), false), nullptr, job));
+        scene.table = std::move(table);
+        scene.summaries = scene.table->summaries();
+        return {};
     }
-    STX_CHECK(checkPeak({kPreparing.what, 0}, pixels, 0, fromSpool, job.limits));
-    STX_TRY(spool, FileSpool::create(o.output == "-" ? std::filesystem::temp_directory_path()
-                                                     : folderOf(o.output),
-                                     limit / kBudgetPart));
-    STX_TRY(auto bundle, wholeBundle(*table, *spool, job));
-    return Model(std::move(bundle));
+    if (table->whole()) {
+        STX_TRY(scene.model, wholeBundle(std::move(table), job));
+        return {};
+    }
+    STX_TRY(scene.model, readViews(o, drawingMemory(settings), *table,
+                                   std::vector<bool>(table->count(), true), {}, scene.spool, job));
+    return {};
+}
+
+std::int64_t pointsOf(const std::vector<ViewSummary>& summaries) {
+    std::int64_t points = 0;
+    for (const ViewSummary& s : summaries) points += s.points;
+    return points;
 }
 
 }  // namespace
@@ -119,11 +161,11 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
         noteUnused(Bundle(), o, command, program);
         return scene;
     }
-    STX_TRY(scene.model, openStill(o, drawingMemory(settings), scene.spool, program.job));
+    STX_CHECK(openStill(o, settings, scene, program.job));
     noteUnused(scene.model, o, command, program);
     const auto addViews = [&](const auto& seen) -> Result<void> {
         for (const auto& v : seen.views) scene.context.views.push_back(v.camera);
-        scene.points = seen.pointCount();
+        scene.points = scene.table ? pointsOf(scene.summaries) : seen.pointCount();
         scene.environment = settings.ownEnvironment && seen.environment;
         if (sways) {
             STX_TRY(scene.context.sway, swayPose(o.camera, seen));
@@ -144,6 +186,42 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
     scene.context.bounds = boundsOf(scene.model);
     scene.context.origin = originOf(scene.model);
     return scene;
+}
+
+Result<void> makeStill(const RenderOptions& o, const RenderSettings& settings,
+                       const std::vector<NovelCamera>& pictures, DrawnScene& scene, Job& job) {
+    if (scene.table) {
+        std::vector<Camera> cameras;
+        const auto part = o.shard.rangeOf(pictures.size());
+        for (std::size_t i = part.first; i < part.end; ++i) cameras.push_back(pictures[i].camera);
+        const auto& headers = std::get<Bundle>(scene.model).views;
+        const auto wanted =
+            neededViews(o.backend, o.device, headers, scene.summaries, settings, cameras);
+        const auto check = [&](std::size_t index, const ReferenceView& view) -> Result<void> {
+            if (summaryOfView(view) == scene.summaries[index]) return {};
+            return failAt(fmt::format("{}: view {}", scene.table->where(), index),
+                          ErrorCode::invalidInput,
+                          "its summary is not that of its pixels: the file is damaged; write it "
+                          "anew (stx refine)");
+        };
+        STX_TRY(scene.model, readViews(o, drawingMemory(settings), *scene.table, wanted, check,
+                                       scene.spool, job));
+        const bool all = std::ranges::find(wanted, false) == wanted.end();
+        scene.table.reset();
+        if (!all) {
+            STX_TRY(scene.still, makeRenderer(std::get<Bundle>(scene.model), scene.summaries,
+                                              scene.spool.get(), settings, job));
+            return {};
+        }
+    }
+    if (scene.spool) {
+        STX_TRY(scene.still, makeRenderer(o.backend, std::get<Bundle>(scene.model), *scene.spool,
+                                          settings, o.device, job));
+    } else {
+        STX_TRY(scene.still,
+                rendererOf(std::move(scene.model), settings, job, o.backend, o.device));
+    }
+    return {};
 }
 
 Result<std::vector<NovelCamera>> picturesOf(const RenderOptions& o, const DrawnScene& scene,

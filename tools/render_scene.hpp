@@ -49,6 +49,10 @@ inline constexpr const char* kEnvironmentLight = "environment";
 struct DrawnScene {
     std::unique_ptr<FileSpool> spool;  ///< of a model that takes much memory; else null
     Model model;                       ///< of what stands still
+    /// Of a model whose views are read when the pictures are known, else null: until then `model`
+    /// is a bundle of their headers. See makeStill().
+    std::unique_ptr<ViewTable> table;
+    std::vector<ViewSummary> summaries;  ///< of its views, where not all of them are read
     std::unique_ptr<Renderer> still;
     std::unique_ptr<MovingPictures> moving;
     CameraContext context;
@@ -59,6 +63,12 @@ struct DrawnScene {
 /// Opens the input: as a sequence when times are asked for. Notes options that do not matter to it.
 [[nodiscard]] Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& settings,
                                            const Command& command, Program& program);
+
+/// Reads the views that pictures are drawn from, and makes the renderer of a scene that stands
+/// still. Errors: those of the views; (invalidInput) a summary that is not that of its pixels.
+[[nodiscard]] Result<void> makeStill(const RenderOptions& o, const RenderSettings& settings,
+                                     const std::vector<NovelCamera>& pictures, DrawnScene& scene,
+                                     Job& job);
 
 /// A picture for each camera, for each time, or for each pair of them.
 [[nodiscard]] Result<std::vector<NovelCamera>> picturesOf(const RenderOptions& o,

@@ -1,11 +1,15 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include "formats/imagesets/image_sets.hpp"
 
 namespace stx {
+
+struct ReferenceView;
+struct ViewSummary;
 
 struct OpenOptions {
     std::string texture;     ///< texture of a mesh, in place of those that it names; empty = none
@@ -29,7 +33,10 @@ struct OpenOptions {
 
 struct SaveOptions {
     bool noClobber = false;  ///< error (io) when the target exists
-    int jpegQuality = 0;     ///< 0 = PNG, exact; 1..100 = colour as JPEG (MPEG-4, atlas folders)
+    /// OpenEXR: gives what is kept of each view for those who draw without its pixels
+    /// (ViewTable::summaries()), from any thread; null: nothing is.
+    std::function<ViewSummary(const ReferenceView& view)> summarise;
+    int jpegQuality = 0;  ///< 0 = PNG, exact; 1..100 = colour as JPEG (MPEG-4, atlas folders)
     /// MPEG-4 films: pictures that change as H.264 video, colour of this quality (0 best, 51
     /// worst), depth lossless in 8 or 10 bits; -1: as PNG or JPEG pictures.
     int h264 = -1;

@@ -4,6 +4,7 @@
 
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
+#include "lib/model/view_summary.hpp"
 
 namespace stx {
 
@@ -32,7 +33,8 @@ Result<void> saveViews(const ViewTable& table, const fs::path& target, const Sav
     if (container == FileKind::exr && options.octreeLevels > 0)
         return fail(ErrorCode::usage, "'{}': an OctreeImage is written as .mp4, .xmt or .bt only",
                     target.string());
-    if (container == FileKind::exr) return writeExrViews(table, target, job, {options.noClobber});
+    if (container == FileKind::exr)
+        return writeExrViews(table, target, job, {options.noClobber}, options.summarise);
     return writeMpeg4Views(table, target, job, mpeg4Scene(options), mpeg4Write(options));
 }
 

@@ -15,7 +15,8 @@
 //              stx:fx, stx:fy, stx:cx, stx:cy (double, pixels) · stx:nearPlane, stx:farPlane
 //              (double) · stx:depthBits (int) · stx:points (double) · stx:noDepth ("unknown" or
 //              "empty", which is left out) · stx:refined (text: see Refined::text()) · stx:pruned
-//              (int, 1; of pruned views only) · stx:background (int, 1; of background views only)
+//              (int, 1; of pruned views only) · stx:background (int, 1; of background views only) ·
+//              stx:summary (text: see ViewSummary::text(); of views that are known to be exact)
 //   part 0:    stx:version (int) · stx:kind ("bundle") · stx:colour ("sRGB8" or "linear") ·
 //              stx:title (text) · stx:boundsMin, stx:boundsMax (v3d) · stx:origin (v3d; where it
 //              is not 0: added to positions and bounds, gives the world's) · stx:time (double,
@@ -165,11 +166,17 @@ Result<void> writeView(ExrWriter& writer, int index, const ReferenceView& view) 
     });
 }
 
+using Summarise = std::function<ViewSummary(const ReferenceView&)>;
+
 /// Writes views while they come. `hasPoints`: some view has a point, so that there are bounds.
 /// False, and a file that is not finished, where none has.
-Result<bool> writeViews(const ViewTable& table, bool hasPoints, OutputFile& file, Job& job) {
+Result<bool> writeViews(const ViewTable& table, bool hasPoints, const Summarise& summarise,
+                        OutputFile& file, Job& job) {
     auto parts = partsFrom(table);
     const auto count = parts.size();
+    // As long as those that come.
+    if (summarise)
+        for (ExrPart& part : parts) part.attributes["stx:summary"] = ViewSummary().text();
     const Bundle& about = table.about();
     Bounds bounds = about.bounds.value_or(Bounds());
     if (about.bounds ? !bounds.empty() : hasPoints) setBounds(parts[0], bounds);
@@ -187,6 +194,7 @@ Result<bool> writeViews(const ViewTable& table, bool hasPoints, OutputFile& file
         auto points = view->checkedPointCount();
         if (!points) return tl::unexpected(points.error().at(fmt::format("view {}", i)));
         setPixelAttributes(parts[i], *view, *points);
+        if (summarise) parts[i].attributes["stx:summary"] = summarise(*view).text();
         if (!about.bounds) each[i] = view->computeBounds();
         views[i] = std::move(view);
         return {};
@@ -214,11 +222,12 @@ Result<bool> writeViews(const ViewTable& table, bool hasPoints, OutputFile& file
     return true;
 }
 
-Result<void> writeTable(const ViewTable& table, OutputFile& file, Job& job) {
-    STX_TRY(const bool written, writeViews(table, true, file, job));
+Result<void> writeTable(const ViewTable& table, const Summarise& summarise, OutputFile& file,
+                        Job& job) {
+    STX_TRY(const bool written, writeViews(table, true, summarise, file, job));
     if (written) return {};
     // Headers whose bounds stay away are shorter.
-    STX_CHECK(writeViews(table, false, file, job));
+    STX_CHECK(writeViews(table, false, summarise, file, job));
     return {};
 }
 
@@ -338,14 +347,14 @@ const char* ExrBundleHeader::nodeKind() const {
 
 Result<void> writeExrBundle(const Bundle& bundle, OutputFile& file, Job& job) {
     STX_CHECK(bundle.checkHeaders());
-    return writeTable(*viewsOf(bundle), file, job);
+    return writeTable(*viewsOf(bundle), {}, file, job);
 }
 
 Result<void> writeExrViews(const ViewTable& table, const std::filesystem::path& path, Job& job,
-                           OutputFile::Options options) {
+                           OutputFile::Options options, const Summarise& summarise) {
     if (table.whole()) STX_CHECK(table.about().checkHeaders());
     STX_TRY(auto file, OutputFile::create(path, options));
-    if (auto ok = writeTable(table, file, job); !ok)
+    if (auto ok = writeTable(table, summarise, file, job); !ok)
         return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
     return file.commit();
 }
@@ -389,6 +398,8 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
             points && *points >= 0 && *points <= 1e15)
             entry.points = static_cast<std::int64_t>(*points);
         entry.bytes = part.bytes;
+        if (const auto* summary = part.attribute<std::string>("stx:summary"))
+            entry.summary = ViewSummary::from(*summary);
         header.views.push_back(std::move(entry));
     }
     if (const int at = environmentPartOf(reader); at >= 0) {
@@ -430,11 +441,14 @@ Result<Bundle> bundleWithoutPixels(const ExrReader& reader, ExrBundleHeader head
 
 class ExrViews : public ViewTable {
   public:
-    ExrViews(ExrReader reader, Bundle headers, std::vector<ViewImageKinds> kinds)
+    ExrViews(ExrReader reader, Bundle headers, std::vector<ViewImageKinds> kinds,
+             std::vector<ViewSummary> summaries)
         : ViewTable(std::move(headers), std::move(kinds)),
           reader_(std::move(reader)),
-          parts_(exrViewParts(reader_)) {}
+          parts_(exrViewParts(reader_)),
+          summaries_(std::move(summaries)) {}
 
+    std::vector<ViewSummary> summaries() const override { return summaries_; }
     std::string where() const override { return reader_.where(); }
 
   protected:
@@ -452,6 +466,7 @@ class ExrViews : public ViewTable {
   private:
     ExrReader reader_;
     std::vector<int> parts_;
+    std::vector<ViewSummary> summaries_;
 };
 
 ViewImageKinds kindsOf(const ExrPart& part, bool linear) {
@@ -474,11 +489,16 @@ Result<std::unique_ptr<ViewTable>> openExrViews(const std::filesystem::path& pat
         if (!isOurView(part)) return std::unique_ptr<ViewTable>();
         kinds.push_back(kindsOf(part, header.linear));
     }
+    std::vector<ViewSummary> summaries;
+    for (const ExrViewHeader& view : header.views)
+        if (view.summary) summaries.push_back(*view.summary);
+    if (summaries.size() < header.views.size()) summaries.clear();
     STX_TRY(auto bundle, bundleWithoutPixels(reader, std::move(header), job));
     if (const int at = environmentPartOf(reader); at >= 0) {
         STX_TRY(bundle.environment, readEnvironmentPart(reader, at, job));
     }
-    return std::make_unique<ExrViews>(std::move(reader), std::move(bundle), std::move(kinds));
+    return std::make_unique<ExrViews>(std::move(reader), std::move(bundle), std::move(kinds),
+                                      std::move(summaries));
 }
 
 Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {

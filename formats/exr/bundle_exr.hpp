@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,6 +24,7 @@ struct ExrViewHeader {
     bool metallicRoughness = false, emissive = false;
     std::int64_t points = -1;  ///< -1 = the file does not say
     std::uint64_t bytes = 0;   ///< of the pixels in the file, compressed
+    std::optional<ViewSummary> summary;
 };
 
 /// What the headers of an OpenEXR bundle say, without a pixel decoded.
@@ -59,8 +61,11 @@ struct ExrBundleHeader {
                                           Job& job, OutputFile::Options options = {});
 /// The same bytes of views that are written when they come: what their headers say of pixels
 /// (planes, points, bounds) is put into the file at the end.
-[[nodiscard]] Result<void> writeExrViews(const ViewTable& table, const std::filesystem::path& path,
-                                         Job& job, OutputFile::Options options = {});
+/// `summarise`, if any: see SaveOptions.
+[[nodiscard]] Result<void> writeExrViews(
+    const ViewTable& table, const std::filesystem::path& path, Job& job,
+    OutputFile::Options options = {},
+    const std::function<ViewSummary(const ReferenceView&)>& summarise = {});
 
 /// Reads what writeExrBundle() wrote. Parts of other programs are views, too, when they have Z and
 /// worldToCamera; their planes are fitted to their depth, and distances of 1e9 and more, NaN and

@@ -198,22 +198,24 @@ Result<Bundle> wholeBundle(std::unique_ptr<ViewTable> table, Job& job) {
     return wholeBundle(*table, job);
 }
 
-namespace {
-
-/// All views, each moved into the spool, if any, when it is read.
-Result<Bundle> allViews(const ViewTable& table, PixelSpool* spool, Job& job) {
+Result<Bundle> someViews(
+    const ViewTable& table, const std::vector<bool>& wanted, PixelSpool* spool, Job& job,
+    const std::function<Result<void>(std::size_t, const ReferenceView&)>& look) {
     Bundle bundle = headersOf(table.about());
     const auto count = static_cast<std::int64_t>(table.count());
+    const auto all = std::ranges::count(wanted, true);
     std::vector<Result<void>> done(table.count());
     std::atomic<std::int64_t> finished = 0;
     parallelFor(0, count, [&](std::int64_t i) {
         const auto index = static_cast<std::size_t>(i);
+        if (!wanted[index]) return;
         done[index] = [&]() -> Result<void> {
             STX_CHECK(job.checkCancelled());
             STX_TRY(auto view, table.view(index, job));
+            if (look) STX_CHECK(look(index, *view));
             bundle.views[index] = std::move(*ownView(std::move(view)));
             bundle.views[index].moveTo(spool);
-            job.progress(++finished, count, "reading views");
+            job.progress(++finished, all, "reading views");
             return {};
         }();
     });
@@ -222,19 +224,17 @@ Result<Bundle> allViews(const ViewTable& table, PixelSpool* spool, Job& job) {
     return bundle;
 }
 
-}  // namespace
-
 Result<Bundle> wholeBundle(const ViewTable& table, Job& job) {
     if (table.whole()) return table.about();
     std::uint64_t bytes = 0;
     for (std::size_t i = 0; i < table.count(); ++i) bytes += table.bytesOf(i);
     if (auto ok = job.limits.checkAllocation(bytes, 1, "the views"); !ok)
         return tl::unexpected(ok.error().at(table.where()));
-    return allViews(table, nullptr, job);
+    return someViews(table, std::vector<bool>(table.count(), true), nullptr, job);
 }
 
 Result<Bundle> wholeBundle(const ViewTable& table, PixelSpool& spool, Job& job) {
-    return allViews(table, &spool, job);
+    return someViews(table, std::vector<bool>(table.count(), true), &spool, job);
 }
 
 void noteMaterialLeftOut(const ViewTable& table, Job& job) {

@@ -10,6 +10,7 @@
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/model/view_summary.hpp"
 
 namespace stx {
 
@@ -70,6 +71,9 @@ class ViewTable {
         return bytesGiven(index);
     }
     [[nodiscard]] std::uint64_t pixelsOf(std::size_t index) const;
+    /// What the file keeps of its views for those who draw without their pixels, one for each;
+    /// empty where it does not of all of them. Pixels that come need not agree.
+    [[nodiscard]] virtual std::vector<ViewSummary> summaries() const { return {}; }
     /// The file that it is read from, in quotes, for messages; may be empty.
     [[nodiscard]] virtual std::string where() const { return {}; }
     /// Views that may be made at a time; 0: any number.
@@ -102,6 +106,11 @@ class ViewTable {
 [[nodiscard]] Result<Bundle> wholeBundle(const ViewTable& table, Job& job);
 /// The same in a spool, which must outlive it.
 [[nodiscard]] Result<Bundle> wholeBundle(const ViewTable& table, PixelSpool& spool, Job& job);
+/// Some of the views, in a spool if it is not null; the others have their headers only. `look`, if
+/// any, is called with each that is read, from any thread.
+[[nodiscard]] Result<Bundle> someViews(
+    const ViewTable& table, const std::vector<bool>& wanted, PixelSpool* spool, Job& job,
+    const std::function<Result<void>(std::size_t index, const ReferenceView& view)>& look = {});
 /// The same; what is in memory already is moved.
 [[nodiscard]] Result<Bundle> wholeBundle(std::unique_ptr<ViewTable> table, Job& job);
 

@@ -1,5 +1,7 @@
 #include "lib/render/factory.hpp"
 
+#include <algorithm>
+
 #include "lib/render/compose/behind.hpp"
 #include "lib/render/compose/environment_behind.hpp"
 #include "lib/render/compose/fallback.hpp"
@@ -7,6 +9,8 @@
 #include "lib/render/scene/page_set.hpp"
 #include "lib/render/splat/cpu/cpu_splat.hpp"
 #include "lib/render/surface/cpu/cpu_surface.hpp"
+#include "lib/render/surface/plan/needed_views.hpp"
+#include "lib/render/surface/prepare/summary.hpp"
 #ifdef STX_WITH_GPU
 #include "lib/render/device/egl_context.hpp"
 #include "lib/render/splat/gl/gl_renderer.hpp"
@@ -232,6 +236,34 @@ Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bu
                                                int device, Job& job) {
     STX_CHECK(bundle.check());
     return makeFrom(backend, PageSet(bundle, spool), settings, bundle.environment, device, job);
+}
+
+ViewSummary summaryOfView(const ReferenceView& view) {
+    return surface::summaryOf(view);
+}
+
+bool tellWithoutPixels(const std::vector<ReferenceView>& views) {
+    return std::ranges::all_of(views, surface::tellsWithoutPixels);
+}
+
+std::vector<bool> neededViews(Backend backend, int device, const std::vector<ReferenceView>& views,
+                              std::span<const ViewSummary> summaries,
+                              const RenderSettings& settings, std::span<const Camera> pictures) {
+    const DeviceChoice choice = deviceChoice(device);
+    const bool onProcessor = backend == Backend::cpu ||
+                             (backend == Backend::automatic && choice.exists && !choice.hardware);
+    if (!onProcessor) return std::vector<bool>(views.size(), true);
+    return surface::neededViews(views, summaries, settings, pictures);
+}
+
+Result<std::unique_ptr<Renderer>> makeRenderer(const Bundle& bundle,
+                                               std::span<const ViewSummary> summaries,
+                                               PixelSpool* spool, const RenderSettings& settings,
+                                               Job& job) {
+    RenderSettings exact = settings;
+    exact.refine = RefineSettings::none();
+    return makeFrom(Backend::cpu, PageSet(bundle, summaries, spool), exact, bundle.environment, -1,
+                    job);
 }
 
 Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Atlas& atlas,

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "lib/base/job.hpp"
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/model/view_summary.hpp"
 #include "lib/render/api/renderer.hpp"
 
 namespace stx {
@@ -27,6 +29,30 @@ namespace stx {
                                                              PixelSpool& spool,
                                                              const RenderSettings& settings,
                                                              int device, Job& job);
+
+/// What is kept of a view, so that its pixels need not be read for pictures in which it has no
+/// part. The same pixels have the same summary.
+[[nodiscard]] ViewSummary summaryOfView(const ReferenceView& view);
+/// Whether summaries of such views, by their headers, may spare the reading of some.
+[[nodiscard]] bool tellWithoutPixels(const std::vector<ReferenceView>& views);
+/// Of each view of a bundle whether its pixels must be there for some pictures; `views` are their
+/// headers, `summaries` one for each. The others may be empty, see below. All must, unless surface
+/// mode draws on the processor, and where summaries do not tell.
+[[nodiscard]] std::vector<bool> neededViews(Backend backend, int device,
+                                            const std::vector<ReferenceView>& views,
+                                            std::span<const ViewSummary> summaries,
+                                            const RenderSettings& settings,
+                                            std::span<const Camera> pictures);
+/// The renderer of a bundle whose views are not all there: what it draws of the pictures that the
+/// views were chosen for is the same to the bit as from all of them. Those without images have the
+/// summaries of theirs, and all that stx refine finds nothing to do in (mayRefine()), so that
+/// nothing is refined. `spool` may be null. The bundle, the summaries and the spool must outlive
+/// the renderer.
+[[nodiscard]] Result<std::unique_ptr<Renderer>> makeRenderer(const Bundle& bundle,
+                                                             std::span<const ViewSummary> summaries,
+                                                             PixelSpool* spool,
+                                                             const RenderSettings& settings,
+                                                             Job& job);
 /// The same of an atlas, which is drawn from its own textures.
 [[nodiscard]] Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Atlas& atlas,
                                                              const RenderSettings& settings,

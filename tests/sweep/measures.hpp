@@ -43,6 +43,9 @@ Outcome unknownDepth(Pictures& pictures);
 Outcome recordedBelowWarp(Pictures& pictures);
 Outcome refiningIsWorse(Pictures& pictures);
 
+// chosen_views.cpp: some of the views, the pixels of the others not there.
+Outcome chosenViews(Pictures& pictures);
+
 /// A number that follows from the case, to choose among variants: 0 <= number < below.
 [[nodiscard]] int pick(const Pictures& pictures, int salt, int below);
 

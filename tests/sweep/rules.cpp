@@ -65,6 +65,8 @@ const std::vector<SweepRule>& rules() {
         {"agree", "exact views agree about their distances", 0, "views",
          "what counts as one surface is far above what interpolation rounds", 1,
          measures::exactViewsDisagree},
+        {"chosen", "the views that a picture needs draw what all do", 0, "pixels", "as promised",
+         0.3, measures::chosenViews},
     };
     return kRules;
 }

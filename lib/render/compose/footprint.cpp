@@ -88,6 +88,7 @@ class FootprintRenderer final : public Renderer {
 Footprint::Footprint(const PageSet& set) {
     for (std::size_t v = 0; v < set.views().size(); ++v) {
         const Camera& c = set.views()[v].camera;
+        if (set.views()[v].unread) continue;  // no point of it is in a picture
         for (int j = 0; j < kGrid; ++j) {
             for (int i = 0; i < kGrid; ++i) {
                 const int x = (2 * i + 1) * c.width / (2 * kGrid);

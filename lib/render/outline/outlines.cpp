@@ -111,6 +111,7 @@ Outlines::Outlines(PageSet set) : set_(std::move(set)) {
     parallelFor(0, static_cast<std::int64_t>(rectangles.size()), [&](std::int64_t n) {
         set_.settle();
         const PageRectangle& r = rectangles[static_cast<std::size_t>(n)];
+        if (set_.views()[static_cast<std::size_t>(r.view)].unread) return;
         const Page& page = set_.pages()[static_cast<std::size_t>(r.page)];
         for (int v = 0; v < r.height; v += kOutlineBlock) {
             for (int u = 0; u < r.width; u += kOutlineBlock) {

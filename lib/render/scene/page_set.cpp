@@ -102,6 +102,15 @@ PageSet::PageSet(const Bundle& bundle, PixelSpool& spool) {
     data_ = std::move(data);
 }
 
+PageSet::PageSet(const Bundle& bundle, std::span<const ViewSummary> summaries, PixelSpool* spool) {
+    auto data = std::make_shared<Data>();
+    addBundle(bundle, *data);
+    for (std::size_t i = 0; i < data->views.size(); ++i)
+        if (bundle.views[i].depth.empty()) data->views[i].unread = &summaries[i];
+    data->spool = spool;
+    data_ = std::move(data);
+}
+
 Result<PageSet> PageSet::of(const Atlas& atlas, Job& job) {
     STX_CHECK(atlas.check());
     auto data = std::make_shared<Data>();
@@ -175,6 +184,12 @@ void PageSet::buildIndex(Data& data) {
         }
         index.begin.push_back(static_cast<std::uint32_t>(index.near.size()));
     }
+}
+
+bool PageSet::linear() const {
+    const auto read =
+        std::ranges::find_if(pages(), [](const Page& p) { return !p.depth->empty(); });
+    return read != pages().end() && read->texture->isLinear();
 }
 
 bool PageSet::exactDepth() const {

@@ -14,6 +14,7 @@
 #include "lib/geometry/depth_code.hpp"
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
+#include "lib/model/view_summary.hpp"
 #include "lib/refine/refine.hpp"
 
 namespace stx {
@@ -61,6 +62,9 @@ struct PageView : ViewHeader {
     std::uint32_t firstRectangle = 0, rectangleCount = 0;
     /// One upright rectangle holds all of the view, and nothing else is on the page.
     bool whole = false;
+    /// Of a view whose pixels were not read, which is whole and has no part in what is drawn; else
+    /// null. It belongs to who made the set. The images of its page are empty.
+    const ViewSummary* unread = nullptr;
 };
 
 /// What renderers draw from: texture pages, rectangles on them, cameras (Lee & Park, section 3.1:
@@ -77,6 +81,9 @@ class PageSet {
     PageSet(const Bundle& bundle);  // NOLINT: a bundle is a set of pages
     /// The same of a bundle in a spool. What is made of its pixels is kept there, too.
     PageSet(const Bundle& bundle, PixelSpool& spool);
+    /// The same of a bundle of which some views have no images, but a summary, which must outlive
+    /// it, too; `summaries`: one for each view. `spool` may be null.
+    PageSet(const Bundle& bundle, std::span<const ViewSummary> summaries, PixelSpool* spool);
     /// The pages of an atlas. Where the rectangles do not have kPadding pixels of padding to
     /// themselves (see Atlas::paddingHolds()) it is unpacked first, which costs the views' memory.
     /// Errors: an atlas that fails check(), memory over the limit.
@@ -97,7 +104,8 @@ class PageSet {
     void settle() const {
         if (spool()) spool()->settle();
     }
-    [[nodiscard]] bool linear() const { return data_->pages[0].texture->isLinear(); }
+    /// Whether colours are linear floats; of a set without pixels: no.
+    [[nodiscard]] bool linear() const;
     [[nodiscard]] bool pruned() const { return data_->pruned; }
     [[nodiscard]] std::int64_t pointCount() const;
     /// The pixels of all views together.

@@ -76,6 +76,7 @@ PageSet PageSet::solid(bool& changed) const {
     std::shared_ptr<Data> data;
     for (std::size_t i = 0; i < data_->pages.size(); ++i) {
         const Page& page = data_->pages[i];
+        if (page.depth->empty()) continue;
         settle();
         const auto inside = translucentInside(*page.texture, *page.depth);
         if (std::none_of(inside.pixels().begin(), inside.pixels().end(),

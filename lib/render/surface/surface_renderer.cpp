@@ -170,7 +170,7 @@ void SurfaceRenderer::findNormals() {
     normals_.resize(scene_.pages.size());
     // Views of an atlas share pages.
     for (std::size_t i = 0; i < scene_.sources.size(); ++i) {
-        if (scene_.sources[i].view->hasNormals) continue;
+        if (scene_.sources[i].view->hasNormals || scene_.sources[i].view->unread) continue;
         for (const PageRectangle& r : scene_.set.rectanglesOf(i)) {
             const auto page = static_cast<std::size_t>(r.page);
             if (!normals_[page].empty()) continue;
@@ -203,7 +203,7 @@ void SurfaceRenderer::findNormals() {
     // Several at once: half of each is done by one thread.
     parallelFor(0, static_cast<std::int64_t>(scene_.sources.size()), [&](std::int64_t n) {
         const auto i = static_cast<std::size_t>(n);
-        if (!scene_.sources[i].view->hasNormals) ofView(i);
+        if (!scene_.sources[i].view->hasNormals && !scene_.sources[i].view->unread) ofView(i);
     });
 }
 

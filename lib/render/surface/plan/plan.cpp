@@ -14,22 +14,6 @@
 namespace stx::surface {
 namespace {
 
-void addBounds(const Source& s, Bounds& bounds) {
-    for (int by = 0; by < s.blocksY; ++by) {
-        for (int bx = 0; bx < s.blocksX; ++bx) {
-            const SourceBlock& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
-            if (!(block.qMax > 0)) continue;
-            for (int corner = 0; corner < 8; ++corner) {
-                const double x = std::min((bx + (corner & 1)) * kBlock, s.width);
-                const double y = std::min((by + (corner >> 1 & 1)) * kBlock, s.height);
-                const double q = (corner & 4) ? block.qMax : block.qMin;
-                const glm::dvec4 p = s.space.worldFromPixel * glm::dvec4(x, y, q, 1.0);
-                bounds.add(glm::dvec3(p) / p.w);
-            }
-        }
-    }
-}
-
 /// For each tile the mean q of the blocks of all sources that may be drawn in it, 0 = none.
 std::vector<double> middlesOf(const SurfaceFrame& frame,
                               std::span<const std::vector<PlacedBlocks>> placed) {

@@ -85,6 +85,7 @@ std::vector<std::shared_ptr<const Texture>> sharpenedTextures(const SurfaceScene
         for (const PageRectangle& r : scene.set.rectangles()) {
             if (static_cast<std::size_t>(r.page) != p) continue;
             const Source& s = scene.sources[static_cast<std::size_t>(r.view)];
+            if (s.view->unread) continue;
             if (const auto* bytes = from.rgba8())
                 sharpen(s, r, bytes->data(), to.rgba8()->data());
             else

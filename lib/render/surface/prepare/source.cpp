@@ -255,6 +255,14 @@ float typicalDist(const Source& s, const Draft& d) {
     return 1.0f / *middle;
 }
 
+/// A source of whose view the pixels were not read: it shows nothing, and hides what it is asked
+/// about, as behind its surface.
+void prepareUnread(Source& s) {
+    s.hasAlpha = s.view->unread->open;
+    s.validShare = s.view->unread->validShare;
+    s.placeOfBlock.assign(s.blocks.size(), Source::kAllPruned);
+}
+
 /// Links, edges, planar pieces and outlines of a source, from its points.
 void prepareSource(Source& s, const RenderSettings& settings, bool blends,
                    std::vector<PreparedPage>& pages) {
@@ -267,6 +275,7 @@ void prepareSource(Source& s, const RenderSettings& settings, bool blends,
     s.blocksX = (s.width + kBlock - 1) / kBlock;
     s.blocksY = (s.height + kBlock - 1) / kBlock;
     s.blocks.resize(static_cast<std::size_t>(s.blocksX) * s.blocksY);
+    if (s.view->unread) return prepareUnread(s);
     Draft d = draftOf(s);
     const DraftCounts counts = countPixels(d.q.data(), d.covered.data(), d.q.count());
     s.hasAlpha = counts.covered < static_cast<std::int64_t>(d.covered.count());
@@ -347,7 +356,7 @@ void SurfaceScene::begin() {
         s.number = i;
         s.set = &set;
         s.pages = pages.data();
-        if (s.view->whole) s.whole = pages.data() + set.rectanglesOf(i)[0].page;
+        if (s.view->whole && !s.view->unread) s.whole = pages.data() + set.rectanglesOf(i)[0].page;
     }
 }
 
@@ -358,8 +367,7 @@ void SurfaceScene::prepare(const RenderSettings& settings) {
     blends = settings.does(Stage::blend) && std::ranges::any_of(sources, [](const Source& s) {
                  return disagree(s.view->refined);
              });
-    const bool whole =
-        std::all_of(sources.begin(), sources.end(), [](const Source& s) { return s.whole; });
+    const bool whole = std::ranges::all_of(sources, [](const Source& s) { return s.view->whole; });
     if (whole) {
         parallelFor(0, static_cast<std::int64_t>(sources.size()), [&](std::int64_t i) {
             prepareSource(sources[static_cast<std::size_t>(i)], settings, blends, pages);

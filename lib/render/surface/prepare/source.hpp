@@ -250,6 +250,9 @@ struct BlockBuffer {
 /// read.
 [[nodiscard]] BlockTexels blockTexels(const Source& source, int x0, int y0, BlockBuffer& buffer);
 
+/// Adds the bounds, in the world, of what is drawn of a source.
+void addBounds(const Source& source, Bounds& bounds);
+
 /// Share of the image border where the view has points or full alpha: near 1 in scenes that fill
 /// the frame.
 [[nodiscard]] double borderCoverage(const Source& source);

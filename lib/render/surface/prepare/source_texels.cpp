@@ -29,6 +29,7 @@ Place Source::placeAmongRectangles(int x, int y) const {
 }
 
 TapPlace Source::tapsInRectangles(int x, int y) const {
+    if (view->unread) return {};
     const int x0 = std::max(x, 0), y0 = std::max(y, 0);
     const int x1 = std::min(x + 3, width - 1), y1 = std::min(y + 3, height - 1);
     const PageRectangle* r = set->find(number, x0, y0, x1, y1);
@@ -69,7 +70,29 @@ BlockTexels blockTexels(const Source& s, int x0, int y0, BlockBuffer& buffer) {
     return {buffer.q.data() + kSide + 1, buffer.info.data() + kSide + 1, kSide};
 }
 
+void addBounds(const Source& s, Bounds& bounds) {
+    if (const ViewSummary* unread = s.view->unread) {
+        if (unread->bounds.empty()) return;
+        bounds.add(unread->bounds.min);
+        bounds.add(unread->bounds.max);
+    }
+    for (int by = 0; by < s.blocksY; ++by) {
+        for (int bx = 0; bx < s.blocksX; ++bx) {
+            const SourceBlock& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
+            if (!(block.qMax > 0)) continue;
+            for (int corner = 0; corner < 8; ++corner) {
+                const double x = std::min((bx + (corner & 1)) * kBlock, s.width);
+                const double y = std::min((by + (corner >> 1 & 1)) * kBlock, s.height);
+                const double q = (corner & 4) ? block.qMax : block.qMin;
+                const glm::dvec4 p = s.space.worldFromPixel * glm::dvec4(x, y, q, 1.0);
+                bounds.add(glm::dvec3(p) / p.w);
+            }
+        }
+    }
+}
+
 double borderCoverage(const Source& s) {
+    if (s.view->unread) return s.view->unread->border;
     std::int64_t points = 0, all = 0;
     const auto count = [&](int x, int y) {
         ++all;
