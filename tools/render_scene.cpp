@@ -101,8 +101,7 @@ bool mayChoose(const RenderOptions& o, const RenderSettings& settings, const Vie
         return settings.refine.of(info.step) == RefineSwitch::on;
     });
     return !o.around && !(o.camera.swayPercent > 0) && !refines && table.about().bounds &&
-           settings.mode == RenderMode::surface && !table.summaries().empty() &&
-           tellWithoutPixels(table.about().views);
+           !table.summaries().empty() && tellWithoutPixels(table.about().views);
 }
 
 /// Opens what stands still. Views that would take more memory than there may be go into a spool,
