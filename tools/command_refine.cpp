@@ -9,6 +9,7 @@
 #include "formats/images/images.hpp"
 #include "lib/base/stopwatch.hpp"
 #include "lib/refine/poses.hpp"
+#include "lib/refine/refine_needed.hpp"
 #include "lib/registration/disagreement.hpp"
 #include "lib/render/factory.hpp"
 #include "tools/commands.hpp"
@@ -49,6 +50,30 @@ nlohmann::ordered_json stepsJson(const RefineReport& report) {
     return steps;
 }
 
+/// The views of one moment that take more memory side by side than there may be, and in which
+/// there is nothing to refine: they are read one by one. Else null.
+Result<std::unique_ptr<ViewTable>> exactViews(const RefineOptions& o,
+                                              const RefineSettings& settings, Sequence& frames,
+                                              Job& job) {
+    STX_TRY(const auto kind, recognise(o.input));
+    if (frames.timeline().count() > 1 || holdsSequences(o.output) ||
+        (kind != FileKind::exr && kind != FileKind::mpeg4))
+        return nullptr;
+    STX_TRY(auto table, frames.views(0, job));
+    if (table->whole() || memoryOfAll(*table, peak::kRefine) <= job.limits.maxMemoryBytes)
+        return nullptr;
+    STX_TRY(const bool needed, mayRefine(*table, settings, job));
+    if (needed) return nullptr;
+    return table;
+}
+
+/// With summaries where nothing is left to do of the views: not all need be there for a picture.
+Result<void> saveStill(const ViewTable& table, const RefineOptions& o, SaveOptions save, Job& job) {
+    if (stepsOf(o) == "auto" && tellWithoutPixels(table.about().views))
+        save.summarise = summaryOfView;
+    return saveViews(table, o.output, save, job);
+}
+
 Result<int> refineInput(const RefineOptions& o, const Command& command, Program& program) {
     const Stopwatch watch;
     if (!o.only.empty())
@@ -71,6 +96,7 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
             o.input);
     std::size_t views = 0;
     bool before = false, first = true;
+    STX_TRY(auto exact, exactViews(o, settings, *frames, program.job));
     frames =
         changedOnTheWay(std::move(frames), o.output, [&](Bundle& bundle, Job& job) -> Result<void> {
             for (const ReferenceView& view : bundle.views)
@@ -87,13 +113,14 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
         });
     SaveOptions save;
     save.noClobber = program.common.noClobber;
-    const bool still = timeline.count() == 1 && containerOf(o.output).value() == FileKind::exr;
-    if (still) {
+    if (exact) {
+        views = exact->count();
+        for (const ViewHeader& view : exact->about().views)
+            before = before || !view.refined.steps.empty();
+        STX_CHECK(saveStill(*exact, o, save, program.job));
+    } else if (timeline.count() == 1 && !holdsSequences(o.output)) {
         STX_TRY(const auto table, frames->views(0, program.job));
-        // Nothing is left to do of them, so that not all need be there for a picture.
-        if (stepsOf(o) == "auto" && tellWithoutPixels(table->about().views))
-            save.summarise = summaryOfView;
-        STX_CHECK(saveViews(*table, o.output, save, program.job));
+        STX_CHECK(saveStill(*table, o, save, program.job));
     } else {
         STX_CHECK(saveSequence(*frames, o.output, save, program.job));
     }

@@ -77,9 +77,10 @@ Result<Bundle> readViews(const RenderOptions& o, const PeakMemory& drawing, cons
                          const std::function<Result<void>(std::size_t, const ReferenceView&)>& look,
                          std::unique_ptr<FileSpool>& spool, Job& job) {
     const std::uint64_t limit = job.limits.maxMemoryBytes;
-    std::uint64_t inMemory = 0, pixels = 0;
+    std::uint64_t images = 0, inMemory = 0, pixels = 0;
     for (std::size_t i = 0; i < table.count(); ++i) {
         if (!wanted[i]) continue;
+        images += table.bytesOf(i);
         inMemory += table.bytesOf(i) + drawing.perPixel * table.pixelsOf(i);
         pixels += table.pixelsOf(i);
     }
@@ -90,6 +91,8 @@ Result<Bundle> readViews(const RenderOptions& o, const PeakMemory& drawing, cons
         STX_TRY(spool, FileSpool::create(o.output == "-" ? std::filesystem::temp_directory_path()
                                                          : folderOf(o.output),
                                          limit / kBudgetPart));
+    } else if (auto ok = job.limits.checkAllocation(images, 1, "the views"); !ok) {
+        return tl::unexpected(ok.error().at(table.where()));
     }
     return someViews(table, wanted, spool.get(), job, look);
 }
@@ -101,8 +104,7 @@ bool mayChoose(const RenderOptions& o, const RenderSettings& settings, const Vie
         return settings.refine.of(info.step) == RefineSwitch::on;
     });
     return !o.around && !(o.camera.swayPercent > 0) && !refines && table.about().bounds &&
-           settings.mode == RenderMode::surface && !table.summaries().empty() &&
-           tellWithoutPixels(table.about().views);
+           !table.summaries().empty() && tellWithoutPixels(table.about().views);
 }
 
 /// Opens what stands still. Views that would take more memory than there may be go into a spool,

@@ -35,7 +35,7 @@ struct SaveOptions {
     bool noClobber = false;  ///< error (io) when the target exists
     /// OpenEXR: gives what is kept of each view for those who draw without its pixels
     /// (ViewTable::summaries()), from any thread; null: nothing is.
-    std::function<ViewSummary(const ReferenceView& view)> summarise;
+    std::function<ViewSummary(const ReferenceView& view)> summarise = nullptr;
     int jpegQuality = 0;  ///< 0 = PNG, exact; 1..100 = colour as JPEG (MPEG-4, atlas folders)
     /// MPEG-4 films: pictures that change as H.264 video, colour of this quality (0 best, 51
     /// worst), depth lossless in 8 or 10 bits; -1: as PNG or JPEG pictures.

@@ -18,6 +18,7 @@ void forValues(Summary& s, const Visit& visit) {
     visit(s.validShare);
     visit(s.border);
     visit(s.open);
+    visit(s.faint);
     visit(s.translucent);
     for (int axis = 0; axis < 3; ++axis) {
         visit(s.bounds.min[axis]);

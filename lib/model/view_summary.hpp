@@ -22,6 +22,7 @@ struct ViewSummary {
     double validShare = 1;     ///< of the pixels of the object those with a depth, 0..1
     double border = 0;         ///< share of the picture's border where the object is, 0..1
     bool open = false;         ///< some pixel is not covered in full
+    bool faint = false;        ///< where it is drawn as splats, some are not covered in full
     bool translucent = false;  ///< alpha inside of the object says that it is seen through
     Bounds bounds;             ///< of all that is drawn of it, in the world; empty: nothing is
     /// By cell, row by row from the upper left: no surface in it, nor what is drawn of it, is

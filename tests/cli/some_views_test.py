@@ -71,6 +71,10 @@ def check_shards(stx, folder):
             with open(os.path.join(folder, f"all_{k:02d}.png"), "rb") as of_all:
                 if some.read() != of_all.read():
                     wrong.append(f"picture {k} is not that from all views")
+    # Views that are exact and larger than memory are looked at one by one.
+    harness.must([stx, "refine", "views.exr", "-o", "few.exr", "--quiet", "--max-memory", "64"], folder)
+    if harness.tree(folder)["few.exr"] != harness.tree(folder)["refined.exr"]:
+        wrong.append("refine with little memory does not write the same")
     # From a file beside the picture, too.
     harness.must(draw + ["refined.exr", "-o", "tight_%02d.png", "--shard", f"3/{SHARDS}", "--max-memory", "24"], folder)
     for k in range(4, 6):

@@ -48,6 +48,7 @@ Outcome chosenViews(Pictures& pictures) {
     const Bundle all = withNeighbours(captured, random);
     RenderSettings settings;
     settings.refine = RefineSettings::none();
+    if (random.chance(0.4)) settings.mode = RenderMode::splat;
     if (random.chance(0.3)) settings.quality = Quality::best;
     if (random.chance(0.3)) settings.fill = Fill::none;
     settings.normals = random.chance(0.3);
@@ -71,7 +72,9 @@ Outcome chosenViews(Pictures& pictures) {
     STX_TRY(const Frame b, ofSome->render(captured.novel));
     const std::int64_t found = differences(a, b);
     return Measure{static_cast<double>(found),
-                   fmt::format("{} of {} views: {} pixels differ", count, all.views.size(), found)};
+                   fmt::format("{}, {} of {} views: {} pixels differ",
+                               settings.mode == RenderMode::splat ? "splat" : "surface", count,
+                               all.views.size(), found)};
 }
 
 }  // namespace measures

@@ -132,6 +132,7 @@ Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
     parallelFor(0, static_cast<std::int64_t>(all.size()), [&](std::int64_t n) {
         set_.settle();
         const auto number = static_cast<std::size_t>(n);
+        if (set_.views()[number].unread) return;
         const Camera& camera = set_.views()[number].camera;
         const int w = camera.width, h = camera.height;
         Image<std::uint8_t> alpha = alphaOf(set_, number);
@@ -148,7 +149,9 @@ Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
     for (auto& view : all) {
         if (!view.around.empty()) views_.push_back(std::move(view));
     }
-    if (!views_.empty()) outlines_.emplace(set_);
+    const bool unread = std::ranges::any_of(
+        set_.views(), [](const PageView& v) { return v.unread && v.unread->open; });
+    if (!views_.empty() || unread) outlines_.emplace(set_);
 }
 
 /// Which of the `wanted` samples of a pixel, a bit for each, are free at that depth. Asks view

@@ -22,7 +22,7 @@ class Silhouettes {
     explicit Silhouettes(PageSet set);
 
     /// Whether there is nothing to do for these views.
-    [[nodiscard]] bool none() const { return views_.empty(); }
+    [[nodiscard]] bool none() const { return !outlines_; }
     /// Sets alpha, premultiplied colour and albedo of the pixels within two pixels of the
     /// background; what is left with no coverage gets empty. All that was drawn lies in `drawn`.
     /// The same on any number of threads.

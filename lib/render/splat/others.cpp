@@ -123,6 +123,7 @@ class Lookup {
 
   private:
     [[nodiscard]] bool surfaceAt(int x, int y, float depth, float spacing) const {
+        if (set_.views()[view_].unread) return false;
         const PageRectangle* r = set_.find(view_, x, y);
         // Padding repeats what other rectangles show, or what was pruned.
         if (!r || x < r->x0 || y < r->y0 || x >= r->x1 || y >= r->y1) return false;

@@ -306,6 +306,10 @@ PreparedPages preparePages(const PageSet& set, bool wantNormals) {
     }
     for (const PageRectangle& rectangle : set.rectangles()) {
         set.settle();
+        if (set.views()[static_cast<std::size_t>(rectangle.view)].unread) {
+            out.rectangles.emplace_back().rectangle = &rectangle;
+            continue;
+        }
         const Window w(set, rectangle);
         PreparedPage& page = out.pages[static_cast<std::size_t>(rectangle.page)];
         const glm::mat3 cameraFromWorld(

@@ -109,9 +109,10 @@ TEST(NeededViews, AreThoseThatSeeWhatThePictureShows) {
 }
 
 TEST(NeededViews, DrawWhatAllDo) {
-    for (const bool lit : {false, true}) {
+    for (const int which : {0, 1, 2, 3}) {
         RenderSettings settings;
-        settings.normals = lit;
+        settings.normals = which % 2 == 1;
+        if (which >= 2) settings.mode = RenderMode::splat;
         settings.refine = RefineSettings::none();
         for (const double x : {0.3, 9.77, 22.9}) {
             const Camera camera = before(x, 0.3 * std::sin(x));
@@ -151,6 +152,8 @@ TEST(NeededViews, AreAllWhereSummariesDoNotTell) {
     }));
     RenderSettings splats;
     splats.mode = RenderMode::splat;
+    EXPECT_LT(wall().count(camera, splats), kViews);
+    splats.splat = SplatRule::paper;
     EXPECT_EQ(wall().count(camera, splats), kViews);
     const auto onGpu = neededViews(Backend::gpu, -1, wall().bundle.views, wall().summaries, {},
                                    std::span(&camera, 1));

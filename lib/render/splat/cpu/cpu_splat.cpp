@@ -52,6 +52,8 @@ class CpuSplatRenderer final : public Renderer {
             for (const auto& b : r.blocks) opaque_ = opaque_ && b.opaque;
             blockCount_ += r.blocks.size();
         }
+        for (const PageView& view : set_.views())
+            opaque_ = opaque_ && !(view.unread && view.unread->faint);
         tasks_.resize(blockCount_);
         seen_.resize(blockCount_);
     }
@@ -129,6 +131,10 @@ void CpuSplatRenderer::planFrame(const Camera& camera) {
     sources_.clear();
     for (const PageRectangle& r : set_.rectangles()) {
         const auto page = static_cast<std::size_t>(r.page);
+        if (set_.views()[static_cast<std::size_t>(r.view)].unread) {
+            sources_.emplace_back();
+            continue;
+        }
         sources_.push_back(sourceOf(r, set_.pages()[page], prepared_.pages[page], camera));
     }
     std::size_t first = 0;

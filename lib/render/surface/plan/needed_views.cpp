@@ -15,6 +15,9 @@ constexpr int kCells = ViewSummary::kCells;
 /// A picture is taken for larger by so much on each side, pixels: tiles reach beyond it, and so do
 /// the boxes that blocks are placed by.
 constexpr double kAroundPicture = kTile;
+/// Splats reach farther, and quarters of blocks are left out where others show all of their points:
+/// this share of the picture, too.
+constexpr double kAroundSplats = 0.25;
 /// So is a view: by what filling takes for seen beside its picture (share of its size; see
 /// LookedAt::hides()), and each cell by what filters, votes and boxes of blocks reach, pixels.
 constexpr double kBesideView = 0.05, kAroundCell = 8;
@@ -25,7 +28,10 @@ constexpr double kBehindFarPlane = 0.06;
 /// ones.
 class Frustum {
   public:
-    explicit Frustum(const Camera& camera) : camera_(camera) {}
+    /// `around`: share of the picture's size by which it is taken for larger.
+    Frustum(const Camera& camera, double around)
+        : camera_(camera),
+          around_(std::max(kAroundPicture, around * std::max(camera.width, camera.height))) {}
 
     /// Of a point (w = 1) or a direction (w = 0) of the world.
     [[nodiscard]] std::array<double, 5> at(glm::dvec4 world) const {
@@ -34,8 +40,8 @@ class Frustum {
             glm::conjugate(c.orientation) * (glm::dvec3(world) - world.w * c.position);
         const double w = c.orthographic ? world.w : -p.z;
         const double x = c.fx * p.x + c.cx * w, y = -c.fy * p.y + c.cy * w;
-        return {x + kAroundPicture * w, (c.width + kAroundPicture) * w - x, y + kAroundPicture * w,
-                (c.height + kAroundPicture) * w - y, c.orthographic ? 1.0 : w};
+        return {x + around_ * w, (c.width + around_) * w - x, y + around_ * w,
+                (c.height + around_) * w - y, c.orthographic ? 1.0 : w};
     }
     /// Whether some points and directions, and all between them, may be in it: not where they are
     /// all on the other side of one plane.
@@ -51,6 +57,7 @@ class Frustum {
 
   private:
     Camera camera_;
+    double around_;
 };
 
 /// Where a view sees in one of its cells: its own place and four corners, or four directions.
@@ -109,12 +116,16 @@ std::vector<bool> neededViews(const std::vector<ReferenceView>& views,
                               std::span<const ViewSummary> summaries,
                               const RenderSettings& settings, std::span<const Camera> pictures) {
     std::vector<bool> needed(views.size(), true);
-    if (settings.mode != RenderMode::surface || summaries.size() != views.size() || anyTwins(views))
+    const bool splats = settings.mode == RenderMode::splat;
+    // The paper's rule is fitted to all views, and points know each other by their number.
+    if ((splats && settings.splat != SplatRule::data) || summaries.size() != views.size() ||
+        anyTwins(views))
         return needed;
     for (std::size_t i = 0; i < views.size(); ++i)
         if (!tellsWithoutPixels(views[i]) || summaries[i].translucent) return needed;
     std::vector<Frustum> frustums;
-    for (const Camera& picture : pictures) frustums.emplace_back(picture);
+    for (const Camera& picture : pictures)
+        frustums.emplace_back(picture, splats ? kAroundSplats : 0.0);
     std::vector<char> found(views.size());
     parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
         const auto k = static_cast<std::size_t>(i);

@@ -36,6 +36,21 @@ float farthestOf(const Source& s, const ReferenceView& view, int bx, int by) {
     return least > 0 ? 1.0f / (least * (1 - kFartherShare)) : kFar;
 }
 
+/// Whether splats of a block are not covered in full; see splat::BlockInfo.
+bool isFaint(const ReferenceView& view, int bx, int by) {
+    bool drawn = false, faint = false;
+    for (int y = by * kBlock; y < std::min((by + 1) * kBlock, view.depth.height()); ++y) {
+        for (int x = bx * kBlock; x < std::min((bx + 1) * kBlock, view.depth.width()); ++x) {
+            if (!hasPoint(view.depth.at(x, y))) continue;
+            const float alpha =
+                view.texture.alpha(static_cast<std::size_t>(y) * view.depth.width() + x);
+            drawn = drawn || alpha > 0;
+            faint = faint || !(alpha >= 1);
+        }
+    }
+    return drawn && faint;
+}
+
 }  // namespace
 
 ViewSummary summaryOf(const ReferenceView& view) {
@@ -60,6 +75,7 @@ ViewSummary summaryOf(const ReferenceView& view) {
     for (int by = 0; by < s.blocksY; ++by) {
         for (int bx = 0; bx < s.blocksX; ++bx) {
             const float farthest = farthestOf(s, view, bx, by);
+            out.faint = out.faint || isFaint(view, bx, by);
             // All cells that some of it is in.
             const auto cell = [](int pixel, int size) {
                 return std::min(pixel, size - 1) * ViewSummary::kCells / size;
