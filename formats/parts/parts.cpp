@@ -43,7 +43,7 @@ Found findModule(const char* variable, const char* module) {
 
 /// Whether the libraries of a module are here is known when a process opens it.
 Found findDecoder(const DecoderKind& kind, PartCheck check) {
-    const auto found = findModule(kind.variable, kind.module);
+    auto found = findModule(kind.variable, kind.module);
     if (check == PartCheck::quick || found.state != PartState::here) return found;
     const auto process = DecoderProcess::start(kind, DecoderBounds{.memoryBytes = 256u << 20});
     if (!process) return {PartState::missing, process.error().message};

@@ -211,7 +211,7 @@ Result<PhotoImage> embeddedPicture(ByteSpan bytes, std::shared_ptr<const Bytes> 
         PhotoImage::Coding::file, bytes, std::move(owner), 0, info->width, info->height};
 }
 
-Result<Photo> openPhoto(std::shared_ptr<const Bytes> file, const PhotoOptions& options,
+Result<Photo> openPhoto(const std::shared_ptr<const Bytes>& file, const PhotoOptions& options,
                         const Limits& limits) {
     Photo photo;
     photo.file = file;

@@ -93,7 +93,7 @@ struct PhotoOptions {
 /// Finds the pictures in a file and reads what it tells of them. Decodes nothing; counts and
 /// offsets are checked against the file, and sizes against the limits. Errors: (invalidInput) no
 /// depth, with what there is instead; damaged; (unsupported) a known layout that is not read.
-[[nodiscard]] Result<Photo> openPhoto(std::shared_ptr<const Bytes> file,
+[[nodiscard]] Result<Photo> openPhoto(const std::shared_ptr<const Bytes>& file,
                                       const PhotoOptions& options, const Limits& limits);
 
 /// The colour picture, upright, 8-bit sRGB; `profileNote` tells what became of its colour profile.

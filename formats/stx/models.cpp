@@ -43,7 +43,8 @@ Result<Model> open(const std::filesystem::path& path, const OpenOptions& options
         return Model(std::move(atlas));
     }
     STX_TRY(auto opened, openRenderable(path, options, job));
-    return std::visit([](auto&& model) { return Model(std::move(model)); }, std::move(opened));
+    return std::visit([](auto&& model) { return Model(std::forward<decltype(model)>(model)); },
+                      std::move(opened));
 }
 
 Result<void> save(const Bundle& bundle, const std::filesystem::path& target,

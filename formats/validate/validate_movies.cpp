@@ -52,7 +52,7 @@ void checkMovie(const Movie& movie, const StreamImages& images, const std::strin
     if (!stream.samples.front().sync)
         findings.add(7004, where, "a first picture that needs others", "one that stands alone");
     if (stream.samples.size() > 1) {
-        const Presentation shown = images.presentation(stream);
+        const Presentation& shown = images.presentation(stream);
         std::vector<bool> seen(stream.samples.size(), false);
         for (const auto& entry : shown.shown) seen[entry.sample] = true;
         const auto hidden = std::count(seen.begin(), seen.end(), false);
@@ -97,9 +97,10 @@ void checkPair(const Movie& a, const Movie& b, const StreamImages& images, const
                Findings& findings) {
     const std::string both = fmt::format("{}: {} and {}", where, a.field, b.field);
     if (a.stream->samples.size() > 1 && b.stream->samples.size() > 1) {
-        // Copies: a reference lives until the next is asked for.
-        const Presentation first = images.presentation(*a.stream);
-        const Presentation second = images.presentation(*b.stream);
+        // A copy, since a reference lives until the next is asked for.
+        const Presentation first =  // NOLINT(performance-unnecessary-copy-initialization)
+            images.presentation(*a.stream);
+        const Presentation& second = images.presentation(*b.stream);
         if (!sameTimes(first, second))
             findings.add(
                 7001, both,

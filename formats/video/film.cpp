@@ -259,8 +259,10 @@ Result<void> Film::select(int track) {
         return failAt(where(), ErrorCode::invalidInput, "its track of video has no picture");
     const auto timeOf = [&](std::size_t unit) { return units_[unit].pts; };
     std::ranges::stable_sort(shown_, {}, timeOf);
-    const auto again = std::ranges::unique(shown_, {}, timeOf);
-    shown_.erase(again.begin(), again.end());
+    const auto again = std::unique(shown_.begin(), shown_.end(), [&](std::size_t a, std::size_t b) {
+        return timeOf(a) == timeOf(b);
+    });
+    shown_.erase(again, shown_.end());
     const double tick = static_cast<double>(numerator) / denominator;
     times_.clear();
     for (const std::size_t unit : shown_)

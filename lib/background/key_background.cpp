@@ -134,6 +134,7 @@ FrameGauge KeyBackground::measure(const ReferenceView& view, const Camera& camer
     FrameGauge gauge;
     gauge.gain = lightRatio(pairs);
     std::vector<float> differences;
+    differences.reserve(pairs.size());
     for (const LitPair& p : pairs)
         differences.push_back(255 * std::abs(brightness(p.b / gauge.gain) - brightness(p.a)));
     gauge.noise = medianOf(std::move(differences));

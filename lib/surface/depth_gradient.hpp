@@ -13,8 +13,8 @@ namespace stx {
 /// A depth image as a surface: per pixel w, which is affine in pixels on a plane, and its gradient.
 /// w = 1 / distance in perspective, the distance itself in orthographic views.
 struct DepthSurface {
-    static constexpr std::uint8_t kRight =
-        1;                                    ///< the pixel and its right neighbour are one surface
+    /// The pixel and its right neighbour are one surface.
+    static constexpr std::uint8_t kRight = 1;
     static constexpr std::uint8_t kDown = 2;  ///< the pixel and the one below it are one surface
 
     Image<float> w;             ///< NaN where there is no point; of steps, a smoothed w
@@ -23,13 +23,6 @@ struct DepthSurface {
     /// Scene units between the distances that the image can hold (the depth code's step when the
     /// distances lie on it, else the resolution of a float).
     double step = 0;
-
-    /// All four neighbours exist and are linked.
-    [[nodiscard]] bool interior(int x, int y) const {
-        return x > 0 && y > 0 && x + 1 < w.width() && y + 1 < w.height() &&
-               (links.at(x, y) & kRight) && (links.at(x, y) & kDown) &&
-               (links.at(x - 1, y) & kRight) && (links.at(x, y - 1) & kDown);
-    }
 };
 
 /// w of a distance: 1 / dist, or dist when orthographic.

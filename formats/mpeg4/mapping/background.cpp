@@ -61,6 +61,7 @@ void setGradient(Node& node, const char* what, const std::vector<glm::vec3>& col
                  const std::vector<double>& angles) {
     if (colours.empty()) return;
     std::vector<Color> list;
+    list.reserve(colours.size());
     for (const glm::vec3& c : colours) list.push_back({c.r, c.g, c.b});
     node.set(fmt::format("{}Color", what), std::move(list));
     if (!angles.empty())

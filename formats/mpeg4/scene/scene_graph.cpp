@@ -83,7 +83,9 @@ bool sameBits(const T& a, const T& b) {
                   std::is_same_v<T, glm::vec2> || std::is_same_v<T, glm::vec3> ||
                   std::is_same_v<T, glm::vec4> || std::is_same_v<T, Color> ||
                   std::is_same_v<T, Rotation>) {
-        return std::memcmp(&a, &b, sizeof(T)) == 0;
+        // -0 and NaN count as what they are.
+        return std::memcmp(&a, &b, sizeof(T)) ==
+               0;  // NOLINT(bugprone-suspicious-memory-comparison)
     } else {
         return a == b;
     }

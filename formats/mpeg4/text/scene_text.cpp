@@ -45,7 +45,7 @@ NodePtr holderOf(FieldInfo field) {
     auto defaults = std::make_shared<FieldDefaults>();
     defaults->values.push_back(emptyValue(field.type));
     type->defaults = std::move(defaults);
-    const NodePtr holder = makeNode(*type);
+    NodePtr holder = makeNode(*type);
     holder->ownType = std::move(type);
     return holder;
 }
