@@ -17,7 +17,7 @@ namespace stx::exr {
 namespace {
 
 /// Pixels of a chunk, in the coordinates of the data window.
-struct Box {
+struct ChunkPixels {
     int x = 0, y = 0, width = 0, height = 0;
 };
 
@@ -29,7 +29,7 @@ std::uint64_t samplesOf(int first, int count, int step) {
     return static_cast<std::uint64_t>(before(std::int64_t{first} + count) - before(first));
 }
 
-std::uint64_t samplesOf(const Box& box, const ExrChannel& channel) {
+std::uint64_t samplesOf(const ChunkPixels& box, const ExrChannel& channel) {
     return samplesOf(box.x, box.width, channel.xSampling) *
            samplesOf(box.y, box.height, channel.ySampling);
 }
@@ -44,7 +44,7 @@ std::uint64_t pxr24BytesOf(const ExrChannel& channel) {
 }
 
 template <class BytesOf>
-std::uint64_t totalOf(const ExrPart& part, const Box& box, const BytesOf& each) {
+std::uint64_t totalOf(const ExrPart& part, const ChunkPixels& box, const BytesOf& each) {
     std::uint64_t total = 0;
     for (const auto& channel : part.channels) total += samplesOf(box, channel) * each(channel);
     return total;
@@ -126,7 +126,7 @@ std::optional<std::vector<DwaRule>> rulesOf(ByteSpan text) {
 }
 
 /// What its header claims, against what the channels take (ImfDwaCompressor.cpp, "Data layout").
-bool isWholeDwa(ByteSpan stored, const ExrPart& part, const Box& box) {
+bool isWholeDwa(ByteSpan stored, const ExrPart& part, const ChunkPixels& box) {
     enum Size {
         version,
         unknown,
@@ -177,7 +177,7 @@ bool isWholeDwa(ByteSpan stored, const ExrPart& part, const Box& box) {
     return true;
 }
 
-bool isWhole(ByteSpan stored, const ExrPart& part, const Box& box) {
+bool isWhole(ByteSpan stored, const ExrPart& part, const ChunkPixels& box) {
     const std::uint64_t raw = totalOf(part, box, bytesOf);
     // What packing would not make smaller is stored as it is.
     if (stored.size() >= raw) return stored.size() == raw;
@@ -217,7 +217,7 @@ Result<void> checkChunks(const ExrPart& part, const ChunkLayout& layout, const E
                     "its table of chunks is damaged: it names {} of the {} that its pixels take",
                     chunks.offsets.size(), count);
     const auto boxOf = [&](std::size_t i) {
-        Box box;
+        ChunkPixels box;
         const auto x = static_cast<std::int64_t>(i) % across * stepX;
         const auto y = static_cast<std::int64_t>(i) / across * stepY;
         box.x = static_cast<int>(x);
@@ -227,7 +227,7 @@ Result<void> checkChunks(const ExrPart& part, const ChunkLayout& layout, const E
         return box;
     };
     const auto isGood = [&](std::size_t i) {
-        Box box = boxOf(i);
+        ChunkPixels box = boxOf(i);
         box.x += layout.firstX;
         box.y += layout.firstY;
         // The part where there are several, the first line or a tile's place, the size.
@@ -264,7 +264,7 @@ Result<void> checkChunks(const ExrPart& part, const ChunkLayout& layout, const E
         }
     });
     if (firstBad == count) return {};
-    const Box box = boxOf(firstBad);
+    const ChunkPixels box = boxOf(firstBad);
     return fail(ErrorCode::invalidInput,
                 "the {} of {}x{} pixels at {},{} is damaged: it does not hold all of its pixels; "
                 "the file was cut off or changed",

@@ -82,7 +82,9 @@ void takeAttribute(const Imf::Attribute& a, const std::string& name, ExrPart& pa
 bool isRec709(const Imf::Header& header) {
     if (!Imf::hasChromaticities(header)) return true;
     const Imf::Chromaticities c = Imf::chromaticities(header), rec709;
-    const auto near = [](Imath::V2f a, Imath::V2f b) { return (a - b).length() < 2e-3f; };
+    const auto near = [](const Imath::V2f& a, const Imath::V2f& b) {
+        return (a - b).length() < 2e-3f;
+    };
     return near(c.red, rec709.red) && near(c.green, rec709.green) && near(c.blue, rec709.blue) &&
            near(c.white, rec709.white);
 }
@@ -91,7 +93,7 @@ ExrPart partFrom(const Imf::Header& header) {
     ExrPart part;
     if (header.hasName()) part.name = header.name();
     if (header.hasView()) part.view = header.view();
-    const auto data = header.dataWindow(), display = header.displayWindow();
+    const auto &data = header.dataWindow(), &display = header.displayWindow();
     part.originX = data.min.x - display.min.x;
     part.originY = data.min.y - display.min.y;
     part.width = data.max.x - data.min.x + 1;

@@ -126,7 +126,7 @@ fs::path shownName(const fs::path& path) {
     const std::lock_guard lock(targets().mutex);
     const auto& of = targets().of;
     const auto own = of.find(path);
-    const fs::path shown = own == of.end() ? path : own->second;
+    fs::path shown = own == of.end() ? path : own->second;
     // A file in a folder that is temporary itself.
     fs::path above = shown.parent_path(), inside = shown.filename();
     while (!above.empty()) {

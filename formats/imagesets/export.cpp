@@ -207,7 +207,7 @@ Result<void> exportViews(const ViewTable& table, const path& folder, const Expor
     }
     imagesets::ColourLoss loss;
     const auto write = [&](std::size_t i,
-                           std::shared_ptr<const ReferenceView> read) -> Result<void> {
+                           const std::shared_ptr<const ReferenceView>& read) -> Result<void> {
         const ReferenceView& view = *read;
         loss.look(view, options);
         STX_CHECK(

@@ -106,7 +106,7 @@ Result<void> exportColmap(const ViewTable& table, const path& folder,
     STX_CHECK(
         writeWhole(root / "sparse/points3D.txt", fmt::format("{}: no points\n", kWrittenByUs)));
     const auto write = [&](std::size_t i,
-                           std::shared_ptr<const ReferenceView> view) -> Result<void> {
+                           const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
         STX_CHECK(writePicture(view->texture, root / fmt::format("images/{}.png", names[i])));
         return writeDepth(view->depth,
                           root / fmt::format("stereo/depth_maps/{}.png.geometric.bin", names[i]));

@@ -64,7 +64,7 @@ class FrameExporter {
 
   private:
     /// What the files of a view were last.
-    struct Track {
+    struct WrittenView {
         std::string name;  ///< of its newest files
         ReferenceView before;
     };
@@ -129,7 +129,7 @@ class FrameExporter {
 
     /// Nothing when it is what it was.
     Result<void> writeView(const ReferenceView& view, std::size_t k, std::size_t index) {
-        Track& track = tracks_[k];
+        WrittenView& track = tracks_[k];
         // A camera of which nothing is known yet has no picture.
         if (track.name.empty() && view.depthMayBeUnknown() && view.pointCount() == 0) return {};
         if (index > 0 && samePictures(view, track.before)) return {};
@@ -154,7 +154,7 @@ class FrameExporter {
     fs::path root_;
     OutputJson json_;
     Bundle first_;  ///< names and cameras
-    std::vector<Track> tracks_;
+    std::vector<WrittenView> tracks_;
     std::vector<std::string> names_;
     double unit_ = 0.001;
 };

@@ -189,7 +189,9 @@ Result<SetDescription> describeExr(const path& given, const ImageSetOptions&, Jo
         for (auto& [name, view] : viewsOf(reader)) {
             ExrView own = view;
             const std::string stem = file.stem().string();
-            own.name = name.empty() ? stem : files.size() > 1 ? stem + "_" + name : name;
+            own.name = name.empty()       ? stem
+                       : files.size() > 1 ? fmt::format("{}_{}", stem, name)
+                                          : name;
             all.push_back({file, std::move(own)});
         }
     }

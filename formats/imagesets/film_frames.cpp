@@ -196,39 +196,27 @@ void extendTo(std::optional<double>& end, const std::vector<FramePair>& frames, 
     if (depth.lastDuration() > 0) end = std::max(end.value_or(last), last + depth.lastDuration());
 }
 
-Result<SetDescription> describeFilms(const path& given, const ImageSetOptions& options, Job& job) {
-    if (options.texturePattern.empty() || options.depthPattern.empty())
-        return fail(ErrorCode::usage,
-                    "films come in pairs: give --texture and --depth, with the cameras' file as "
-                    "input");
-    std::error_code ec;
-    const path file = std::filesystem::is_directory(given, ec) ? given / "transforms.json" : given;
-    const path folder = folderOf(file);
-    const std::string where = inQuotes(file.string());
-    STX_TRY(const Json json, readJson(file, job.limits));
-    std::vector<SetView> views;
+namespace {
+
+Result<std::vector<SetView>> camerasOf(const Json& json, const std::string& where, Job& job) {
     switch (jsonKindOf(json)) {
-        case JsonKind::transforms: {
-            STX_TRY(views, within(where, transformsViews(json, job)));
-            break;
-        }
-        case JsonKind::miv: {
-            STX_TRY(views, within(where, mivViews(json, job)));
-            break;
-        }
-        case JsonKind::cameras: {
-            STX_TRY(views, within(where, camerasJsonViews(json, job)));
-            break;
-        }
+        case JsonKind::transforms:
+            return within(where, transformsViews(json, job));
+        case JsonKind::miv:
+            return within(where, mivViews(json, job));
+        case JsonKind::cameras:
+            return within(where, camerasJsonViews(json, job));
         default:
             return failAt(
                 where, ErrorCode::invalidInput,
                 "the cameras of films are those of a transforms.json, of MIV's list or of "
                 "our cameras.json; this is none of them");
     }
-    if (views.empty()) return failAt(where, ErrorCode::invalidInput, "it has no camera");
-    STX_TRY(const auto distances, distancesOf(json, views.size(), where, options));
+}
 
+/// The films of each view, or the one pair of all, opened.
+Result<std::vector<FilmPair>> openPairs(const std::vector<SetView>& views, const path& folder,
+                                        const ImageSetOptions& options, Job& job) {
     const bool each = options.texturePattern.find("{name}") != std::string::npos ||
                       options.depthPattern.find("{name}") != std::string::npos;
     std::vector<FilmPair> pairs;
@@ -246,6 +234,56 @@ Result<SetDescription> describeFilms(const path& given, const ImageSetOptions& o
         pair.views = {i};
         pairs.push_back(std::move(pair));
     }
+    return pairs;
+}
+
+/// Adds the frames of a pair as views of a set, each with its pose.
+Result<void> addFrames(const FilmPair& pair, const std::vector<SetView>& views,
+                       const std::vector<Distances>& distances, const std::string& where, Job& job,
+                       SetDescription& set) {
+    const std::string films = fmt::format("{} and {}", inQuotes(pair.colour->path().string()),
+                                          inQuotes(pair.depth->path().string()));
+    STX_TRY(const auto frames, pairFrames(*pair.colour, *pair.depth, films, job));
+    extendTo(set.end, frames, *pair.depth);
+    double away = 0;
+    if (pair.views.size() > 1 && !sameClock(pair, views, frames)) {
+        away = frames.front().time - firstPose(pair, views);
+        job.note(
+            fmt::format("{}: the poses are not of the films' time, which begins at {:.12g} "
+                        "s: they count from the first frame",
+                        films, frames.front().time));
+    }
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+        STX_TRY(const std::size_t pose,
+                poseOf(pair, views, k, frames.size(), frames[k].time - away, where));
+        SetView view = views[pose];
+        view.name = pair.name;
+        view.taker = pair.name;
+        view.time = frames[k].time;
+        view.texture = frameOf(pair.colour, frames[k].colour);
+        view.depth = frameOf(pair.depth, frames[k].depth);
+        view.distances = distances[pose];
+        view.planes.reset();
+        set.views.push_back(std::move(view));
+    }
+    return {};
+}
+
+}  // namespace
+
+Result<SetDescription> describeFilms(const path& given, const ImageSetOptions& options, Job& job) {
+    if (options.texturePattern.empty() || options.depthPattern.empty())
+        return fail(ErrorCode::usage,
+                    "films come in pairs: give --texture and --depth, with the cameras' file as "
+                    "input");
+    std::error_code ec;
+    const path file = std::filesystem::is_directory(given, ec) ? given / "transforms.json" : given;
+    const std::string where = inQuotes(file.string());
+    STX_TRY(const Json json, readJson(file, job.limits));
+    STX_TRY(const auto views, camerasOf(json, where, job));
+    if (views.empty()) return failAt(where, ErrorCode::invalidInput, "it has no camera");
+    STX_TRY(const auto distances, distancesOf(json, views.size(), where, options));
+    STX_TRY(const auto pairs, openPairs(views, folderOf(file), options, job));
     SetDescription set;
     set.title = pairs[0].colour->path().stem().string();
     set.film = true;
@@ -253,33 +291,8 @@ Result<SetDescription> describeFilms(const path& given, const ImageSetOptions& o
     std::uint64_t count = 0;
     for (const FilmPair& pair : pairs) count += static_cast<std::uint64_t>(pair.depth->count());
     STX_CHECK(checkViewCount(count, job.limits, where));
-    for (const FilmPair& pair : pairs) {
-        const std::string films = fmt::format("{} and {}", inQuotes(pair.colour->path().string()),
-                                              inQuotes(pair.depth->path().string()));
-        STX_TRY(const auto frames, pairFrames(*pair.colour, *pair.depth, films, job));
-        extendTo(set.end, frames, *pair.depth);
-        double away = 0;
-        if (pair.views.size() > 1 && !sameClock(pair, views, frames)) {
-            away = frames.front().time - firstPose(pair, views);
-            job.note(
-                fmt::format("{}: the poses are not of the films' time, which begins at {:.12g} "
-                            "s: they count from the first frame",
-                            films, frames.front().time));
-        }
-        for (std::size_t k = 0; k < frames.size(); ++k) {
-            STX_TRY(const std::size_t pose,
-                    poseOf(pair, views, k, frames.size(), frames[k].time - away, where));
-            SetView view = views[pose];
-            view.name = pair.name;
-            view.taker = pair.name;
-            view.time = frames[k].time;
-            view.texture = frameOf(pair.colour, frames[k].colour);
-            view.depth = frameOf(pair.depth, frames[k].depth);
-            view.distances = distances[pose];
-            view.planes.reset();
-            set.views.push_back(std::move(view));
-        }
-    }
+    for (const FilmPair& pair : pairs)
+        STX_CHECK(addFrames(pair, views, distances, where, job, set));
     return set;
 }
 

@@ -249,17 +249,26 @@ class StepOfView {
     double start_ = threadMilliseconds();
 };
 
-/// Moves all depth by what other pictures of the set show. `values`: as stored, without stairs.
-Result<void> shiftTogether(const SetView& set, const ImageSetOptions& options, const Camera& camera,
+/// Moves all depth by what other pictures of the set show, and the camera's rows to theirs.
+/// `values`: as stored, without stairs.
+Result<void> shiftTogether(const SetView& set, const ImageSetOptions& options, Camera& camera,
                            const Image<float>& values, StoredView& stored, RefineReport& report,
                            Job& job) {
     if (!set.shift || !options.refine.atImport(RefineStep::shift, true)) return {};
     StepOfView step(report, RefineStep::shift);
-    const float shift = set.shift(values, stored.texture, job);
-    if (shift == 0.0f) return {};
+    const SetShift shift = set.shift(values, stored.texture, job);
+    if (shift.down != 0) {
+        camera.cy -= shift.down;
+        step.changed(static_cast<std::int64_t>(stored.depth.count()));
+        job.note(
+            fmt::format("view '{}': its camera looks {:.2f} pixels {}, as other pictures of "
+                        "the set show",
+                        set.name, std::abs(shift.down), shift.down > 0 ? "lower" : "higher"));
+    }
+    if (shift.values == 0.0f) return {};
     Image<float> moved = values;
     for (float& v : moved.pixels())
-        if (hasPoint(v)) v += shift;
+        if (hasPoint(v)) v += shift.values;
     Job notesAgain;
     STX_CHECK(set.distances(moved, camera, stored.depthBits, notesAgain));
     dropImpossible(moved);
@@ -276,13 +285,13 @@ Result<void> shiftTogether(const SetView& set, const ImageSetOptions& options, c
     step.moved(pixels, shares);
     job.note(fmt::format(
         "view '{}': {:.2f} are added to its stored depth, which other pictures of the set show",
-        set.name, shift));
+        set.name, shift.values));
     return {};
 }
 
 /// Makes distances of the stored values, and smooths the stairs of coarse ones. `noDepth`: what
 /// pixels without one are; those of nothing are made transparent.
-Result<void> toDistances(const SetView& set, const ImageSetOptions& options, const Camera& camera,
+Result<void> toDistances(const SetView& set, const ImageSetOptions& options, Camera& camera,
                          StoredView& stored, NoDepth& noDepth, RefineReport& report, Job& job) {
     const int bits = stored.depthBits;
     // What we exported ourselves comes back as it was.
@@ -478,10 +487,12 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
             camera = camera.resized(dw, dh);
         }
     }
-    if (!set.depthCamera)
+    if (!set.depthCamera) {
+        Camera ofDepth = raise ? camera.resized(dw, dh) : camera;
         STX_CHECK(within(fmt::format("'{}'", set.depth.name),
-                         toDistances(set, options, raise ? camera.resized(dw, dh) : camera, stored,
-                                     noDepth, report, job)));
+                         toDistances(set, options, ofDepth, stored, noDepth, report, job)));
+        if (!raise) camera = ofDepth;
+    }
     STX_CHECK(within(fmt::format("'{}'", set.depth.name), needDepth(stored.depth)));
 
     STX_CHECK(repair(set, options, stored, report, job));

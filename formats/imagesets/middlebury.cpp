@@ -79,24 +79,28 @@ struct NumberedPicture {
     PictureSource source;
 };
 
-/// See SetView::shift, of view `number`. Integers may have been cut off, but not by more than half
-/// a step either way from where they are.
-auto shiftBy(std::vector<NumberedPicture> pictures, int number, double scale) {
+/// See SetView::shift, of view `number`. Integers may have been cut off, which takes half a step in
+/// the mean, and rectified pictures lie a little beside each other: a step either way at most.
+auto shiftBy(const std::vector<NumberedPicture>& pictures, int number, double scale) {
     return [=](const Image<float>& values, const Texture& texture, Job& job) {
         std::vector<SidePicture> beside;
+        std::optional<std::size_t> first;  // of those beside
         for (const NumberedPicture& p : pictures) {
             if (p.number == number) continue;
             // Only a help: what cannot be read is not needed.
             auto read = readColour(p.source, {}, texture.isLinear(), job);
-            if (read && read->texture.width() == texture.width() &&
-                read->texture.height() == texture.height())
-                beside.push_back({std::move(read->texture), (p.number - number) / 4.0});
+            if (!read || read->texture.width() != texture.width() ||
+                read->texture.height() != texture.height())
+                continue;
+            if (p.number < number && p.number == pictures.front().number) first = beside.size();
+            beside.push_back({std::move(read->texture), (p.number - number) / 4.0});
         }
         Image<float> disparities = values;
         for (float& d : disparities.pixels())
             if (hasPoint(d)) d = static_cast<float>(d / scale);
-        const double shift = disparityShift(disparities, texture, beside, 0.6 / scale);
-        return static_cast<float>(std::clamp(shift * scale, -0.5, 0.5));
+        const PictureShift shift = pictureShift(disparities, texture, beside, 1.2 / scale);
+        return SetShift{static_cast<float>(std::clamp(shift.disparity * scale, -1.0, 1.0)),
+                        first ? shift.down[*first] : 0.0};
     };
 }
 
@@ -137,6 +141,7 @@ Result<SetDescription> describeOlder(const path& folder, const ImageSetOptions& 
         STX_TRY(auto source, sourceInside(folder, name, where, job.limits));
         pictures.push_back({*older, std::move(source)});
     }
+    std::ranges::sort(pictures, {}, &NumberedPicture::number);
     for (const std::string& name : files) {
         const auto number = numberAfter(path(name).stem().string(), "disp");
         if (!number) continue;

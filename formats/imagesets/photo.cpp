@@ -36,7 +36,7 @@ path depthBeside(const path& picture) {
     if (stem.ends_with(kImage)) stem.resize(stem.size() - kImage.size());
     std::error_code ec;
     for (const char* ending : kDepthEndings) {
-        const path file = folderOf(picture) / (stem + ending);
+        path file = folderOf(picture) / (stem + ending);
         if (std::filesystem::is_regular_file(file, ec)) return file;
     }
     return {};

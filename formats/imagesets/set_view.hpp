@@ -51,6 +51,12 @@ struct StoredView {
 using Distances =
     std::function<Result<void>(Image<float>& values, const Camera& camera, int bits, Job& job)>;
 
+/// How far a view lies beside others of its set; 0 where they do not tell.
+struct SetShift {
+    float values = 0;  ///< what all stored values are too small by, in their own unit
+    double down = 0;   ///< by how many rows the first picture shows lower what it shows
+};
+
 /// One picture with depth of a set.
 struct SetView {
     std::string name;
@@ -75,9 +81,9 @@ struct SetView {
     std::optional<Error> missing;
 
     Distances distances;  ///< null: the stored values are distances already
-    /// What all stored values are too small by, in their own unit, as other pictures of the set
-    /// show; 0 where they do not. The values come without stairs. Null: none can tell.
-    std::function<float(const Image<float>& values, const Texture& texture, Job& job)> shift;
+    /// What other pictures of the set show of it. The values come without stairs. Null: none can
+    /// tell.
+    std::function<SetShift(const Image<float>& values, const Texture& texture, Job& job)> shift;
 
     /// When it was taken, in seconds, and by which camera (empty: the set does not say).
     std::optional<double> time;

@@ -203,27 +203,21 @@ class SceneConverter {
         return files_.textureFromBytes(inside.bytes, name, state, builder_.textures());
     }
 
-    Result<void> convertMesh(const ForeignScene::Mesh& mesh, const glm::dmat4& worldFromMesh) {
-        MeshPart part;
-        part.where = mesh.name.empty() ? "the mesh" : fmt::format("mesh '{}'", mesh.name);
-        const std::size_t count = mesh.positions.size();
-        STX_CHECK(builder_.charge(count, 80, part.where));
-        part.material = mesh.material < builder_.materials().size() ? mesh.material : 0;
+    /// Positions, normals, colours and texture coordinates.
+    void addVertices(const ForeignScene::Mesh& mesh, const glm::dmat4& worldFromMesh,
+                     MeshPart& part) const {
         const bool moved = worldFromMesh != glm::dmat4(1.0);
-        const bool mirrored = glm::determinant(glm::dmat3(worldFromMesh)) < 0;
-        for (const glm::dvec3 p : mesh.positions) {
+        for (const glm::dvec3 p : mesh.positions)
             part.positions.push_back(moved ? glm::dvec3(worldFromMesh * glm::dvec4(p, 1.0)) : p);
-        }
         // A facet's normal in STL is often wrong or zero, and says no more than its corners.
         if (!mesh.normals.empty() && format_ != AssimpFormat::stl) {
             // Cofactors: the inverse transpose but for a factor.
             const glm::dmat3 m(worldFromMesh);
             const glm::dmat3 forNormals(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]),
                                         glm::cross(m[0], m[1]));
-            for (const auto& n : mesh.normals) {
-                part.normals.push_back(
-                    moved ? glm::vec3(forNormals * glm::dvec3(n) * (mirrored ? -1.0 : 1.0)) : n);
-            }
+            const double side = glm::determinant(m) < 0 ? -1.0 : 1.0;
+            for (const auto& n : mesh.normals)
+                part.normals.push_back(moved ? glm::vec3(forNormals * glm::dvec3(n) * side) : n);
         }
         if (!mesh.colours.empty()) {
             part.colours = mesh.colours;
@@ -237,6 +231,10 @@ class SceneConverter {
                 part.uvs.emplace_back(uv.x, 1.0f - uv.y);
             }
         }
+    }
+
+    /// Faces cut into triangles; counts lines and, where there are triangles, points.
+    void addFaces(const ForeignScene::Mesh& mesh, MeshPart& part) {
         std::size_t points = 0;
         const bool triangles = mesh.cornerCounts.empty();
         const std::size_t faces = triangles ? mesh.corners.size() / 3 : mesh.cornerCounts.size();
@@ -263,26 +261,38 @@ class SceneConverter {
             }
             face += sides;
         }
-        if (mirrored) {
-            for (auto& t : part.triangles) std::swap(t.y, t.z);
-        }
         if (!part.triangles.empty()) points_ += points;
         part.points = part.triangles.empty() && (points > 0 || faces == 0);
-        if (part.triangles.empty() && !part.points) return {};
+    }
+
+    /// Without texture coordinates a part gets its material without textures.
+    void dropTexturesWithoutUvs(MeshPart& part) {
         const auto& material = builder_.materials()[part.material];
-        if ((material.baseColourTexture >= 0 || material.emissiveTexture >= 0) &&
-            part.uvs.empty()) {
-            files_.job().note(
-                fmt::format("{} has the textured material '{}' but no texture coordinates; the "
-                            "plain colour is used",
-                            part.where, material.name));
-            auto plain = material;
-            plain.baseColourTexture = plain.normalTexture = -1;
-            if (plain.emissiveTexture >= 0) plain.emissive = glm::vec3(0.0f);
-            plain.emissiveTexture = -1;
-            part.material = static_cast<std::uint32_t>(builder_.materials().size());
-            builder_.materials().push_back(std::move(plain));
-        }
+        const bool textured = material.baseColourTexture >= 0 || material.emissiveTexture >= 0;
+        if (!textured || !part.uvs.empty()) return;
+        files_.job().note(
+            fmt::format("{} has the textured material '{}' but no texture coordinates; the "
+                        "plain colour is used",
+                        part.where, material.name));
+        auto plain = material;
+        plain.baseColourTexture = plain.normalTexture = -1;
+        if (plain.emissiveTexture >= 0) plain.emissive = glm::vec3(0.0f);
+        plain.emissiveTexture = -1;
+        part.material = static_cast<std::uint32_t>(builder_.materials().size());
+        builder_.materials().push_back(std::move(plain));
+    }
+
+    Result<void> convertMesh(const ForeignScene::Mesh& mesh, const glm::dmat4& worldFromMesh) {
+        MeshPart part;
+        part.where = mesh.name.empty() ? "the mesh" : fmt::format("mesh '{}'", mesh.name);
+        STX_CHECK(builder_.charge(mesh.positions.size(), 80, part.where));
+        part.material = mesh.material < builder_.materials().size() ? mesh.material : 0;
+        addVertices(mesh, worldFromMesh, part);
+        addFaces(mesh, part);
+        if (glm::determinant(glm::dmat3(worldFromMesh)) < 0)
+            for (auto& t : part.triangles) std::swap(t.y, t.z);
+        if (part.triangles.empty() && !part.points) return {};
+        dropTexturesWithoutUvs(part);
         weldVertices(part);
         return builder_.add(std::move(part));
     }

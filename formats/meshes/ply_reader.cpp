@@ -314,31 +314,58 @@ class PlyReader {
         return {};
     }
 
-    /// Faces as triangles, one part for each texture; points when there are no faces.
-    Result<void> assemble() {
-        if (corners_.size() > std::numeric_limits<std::uint32_t>::max())
-            return fail(ErrorCode::invalidInput, "the PLY file has more than 2^32 corners");
-        std::vector<Material> materials;
-        if (!header_.textureFiles.empty() && uvs_.empty() && !hasCornerUvs_)
+    /// A material for each texture that the file names, or one.
+    Result<void> makeMaterials() {
+        const bool hasUvs = !uvs_.empty() || hasCornerUvs_;
+        if (!header_.textureFiles.empty() && !hasUvs)
             files_.job().note("the PLY file names a texture but has no texture coordinates for it");
+        auto& materials = builder_.materials();
         for (const auto& name : header_.textureFiles) {
             Material m{.name = name, .hasColour = false};
-            if ((!uvs_.empty() || hasCornerUvs_) && !files_.replacesColour()) {
+            if (hasUvs && !files_.replacesColour()) {
                 STX_TRY(m.baseColourTexture, files_.textureFromFile(name, {}, builder_.textures()));
             }
             materials.push_back(std::move(m));
         }
         if (materials.empty()) materials.push_back({.name = "default", .hasColour = false});
-        builder_.materials() = materials;
-        if (faces_.empty()) {
-            MeshPart part;
-            part.where = "PLY";
-            part.positions = std::move(positions_);
-            part.normals = std::move(normals_);
-            part.colours = std::move(colours_);
-            part.points = true;
-            return builder_.add(std::move(part));
+        return {};
+    }
+
+    Result<void> addPoints() {
+        MeshPart part;
+        part.where = "PLY";
+        part.positions = std::move(positions_);
+        part.normals = std::move(normals_);
+        part.colours = std::move(colours_);
+        part.points = true;
+        return builder_.add(std::move(part));
+    }
+
+    /// Corners that are vertices of their own, with the colour of their face if it is given.
+    void addCorners(std::uint32_t first, std::uint32_t end, const glm::vec4* faceColour,
+                    MeshPart& part) const {
+        for (auto c = first; c < end; ++c) {
+            const auto v = corners_[c].vertex;
+            part.positions.push_back(positions_[v]);
+            if (!normals_.empty()) part.normals.push_back(normals_[v]);
+            if (faceColour)
+                part.colours.push_back(*faceColour);
+            else if (!colours_.empty())
+                part.colours.push_back(colours_[v]);
+            if (hasCornerUvs_)
+                part.uvs.push_back(corners_[c].uv);
+            else if (!uvs_.empty())
+                part.uvs.push_back(uvs_[v]);
         }
+    }
+
+    /// Faces as triangles, one part for each texture; points when there are no faces.
+    Result<void> assemble() {
+        if (corners_.size() > std::numeric_limits<std::uint32_t>::max())
+            return fail(ErrorCode::invalidInput, "the PLY file has more than 2^32 corners");
+        STX_CHECK(makeMaterials());
+        if (faces_.empty()) return addPoints();
+        const auto materials = static_cast<std::uint32_t>(builder_.materials().size());
         const bool useFaceColours = hasFaceColours_ && colours_.empty();
         if (useFaceColours) {
             std::vector<glm::vec4> colours;
@@ -347,7 +374,7 @@ class PlyReader {
             for (std::size_t i = 0; i < faces_.size(); ++i) faces_[i].colour = colours[i];
         }
         std::map<std::uint32_t, MeshPart> parts;
-        const bool shared = !hasCornerUvs_ && !useFaceColours && materials.size() == 1;
+        const bool shared = !hasCornerUvs_ && !useFaceColours && materials == 1;
         std::vector<glm::dvec3> polygon;
         std::vector<glm::uvec3> triangles;
         for (std::size_t f = 0; f < faces_.size(); ++f) {
@@ -359,9 +386,7 @@ class PlyReader {
             for (auto c = face.firstCorner; c < end; ++c)
                 polygon.push_back(positions_[corners_[c].vertex]);
             triangulate(polygon, triangles);
-            const auto texture = std::min<std::uint32_t>(
-                face.texture, static_cast<std::uint32_t>(materials.size() - 1));
-            auto& part = parts[texture];
+            auto& part = parts[std::min(face.texture, materials - 1)];
             const auto base = static_cast<std::uint32_t>(part.positions.size());
             for (const auto& t : triangles) {
                 if (shared)
@@ -371,19 +396,8 @@ class PlyReader {
                 else
                     part.triangles.push_back(t + base);
             }
-            for (auto c = face.firstCorner; !shared && c < end; ++c) {
-                const auto v = corners_[c].vertex;
-                part.positions.push_back(positions_[v]);
-                if (!normals_.empty()) part.normals.push_back(normals_[v]);
-                if (useFaceColours)
-                    part.colours.push_back(face.colour);
-                else if (!colours_.empty())
-                    part.colours.push_back(colours_[v]);
-                if (hasCornerUvs_)
-                    part.uvs.push_back(corners_[c].uv);
-                else if (!uvs_.empty())
-                    part.uvs.push_back(uvs_[v]);
-            }
+            if (!shared)
+                addCorners(face.firstCorner, end, useFaceColours ? &face.colour : nullptr, part);
         }
         for (auto& [texture, part] : parts) {
             part.where = "PLY";

@@ -77,7 +77,7 @@ Gauge::Gauge(const Camera& camera) {
     const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / kGridPoints))));
     for (int y = step / 2; y < camera.height; y += step) {
         for (int x = step / 2; x < camera.width; x += step) {
-            Point p;
+            GaugePixel p;
             p.pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(camera.width) +
                       static_cast<std::uint32_t>(x);
             points_.push_back(p);
@@ -89,13 +89,13 @@ FrameGauge Gauge::measure(const ReferenceView& frame) {
     const auto step = static_cast<float>(frame.depthBits == 32 ? 0.0 : frame.depthCode().step());
     std::vector<glm::vec3> now(points_.size(), glm::vec3(-1.0f));
     for (std::size_t i = 0; i < points_.size(); ++i) {
-        Point& p = points_[i];
+        GaugePixel& p = points_[i];
         const float dist = frame.depth.data()[p.pixel];
         if (hasPoint(dist) && dist > 0 && p.before > 0) noise_.add(p.before, dist);
     }
     noise_.update();
     for (std::size_t i = 0; i < points_.size(); ++i) {
-        const Point& p = points_[i];
+        const GaugePixel& p = points_[i];
         const float dist = frame.depth.data()[p.pixel];
         if (!hasPoint(dist) || !(dist > 0)) continue;
         const bool same =
@@ -110,7 +110,7 @@ FrameGauge Gauge::measure(const ReferenceView& frame) {
     gauge.gain = lightRatio(pairs);
     std::vector<float> differences;
     for (std::size_t i = 0; i < points_.size(); ++i) {
-        Point& p = points_[i];
+        GaugePixel& p = points_[i];
         const float dist = frame.depth.data()[p.pixel];
         const bool point = hasPoint(dist) && dist > 0;
         const glm::vec3 colour = stepsOf(frame.texture, p.pixel) / gauge.gain;

@@ -54,7 +54,7 @@ class Gauge {
     }
 
   private:
-    struct Point {
+    struct GaugePixel {
         std::uint32_t pixel = 0;
         float before = 0;              ///< depth in the frame before, 0 = none
         glm::vec3 beforeColour{0.0f};  ///< without its gain
@@ -63,7 +63,7 @@ class Gauge {
         float count = 0;
     };
 
-    std::vector<Point> points_;
+    std::vector<GaugePixel> points_;
     DepthNoise noise_;
     glm::dvec3 gains_{0.0};
     double noises_ = 0;

@@ -16,12 +16,12 @@ constexpr float kHidden = 0.05f;
 /// One more glimpse is worth its memory when it adds this share of all points.
 constexpr double kWorthIt = 0.01;
 
-struct Point {
+struct SeenPoint {
     glm::dvec3 world;
     double spacing;  ///< between the pixels that saw it, scene units
 };
 
-bool sees(const Glimpse& g, const glm::dmat3& turn, const Point& point) {
+bool sees(const Glimpse& g, const glm::dmat3& turn, const SeenPoint& point) {
     const glm::dvec3 p = turn * (point.world - g.camera.position);
     if (!(p.z < 0) && !g.camera.orthographic) return false;
     const glm::dvec3 at = g.camera.project(p);
@@ -38,7 +38,7 @@ bool sees(const Glimpse& g, const glm::dmat3& turn, const Point& point) {
     return farthest > 0 && at.z <= (1 + kHidden) * farthest;
 }
 
-void addPoints(const Glimpse& g, std::vector<Point>& points) {
+void addPoints(const Glimpse& g, std::vector<SeenPoint>& points) {
     for (int y = 0; y < g.depth.height(); ++y) {
         for (int x = 0; x < g.depth.width(); ++x) {
             const float dist = g.depth.at(x, y);
@@ -58,11 +58,11 @@ glm::dmat3 cameraFromWorld(const Glimpse& g) {
 }  // namespace
 
 std::int64_t sharedPoints(const Glimpse& one, const Glimpse& other) {
-    std::vector<Point> points;
+    std::vector<SeenPoint> points;
     addPoints(one, points);
     const glm::dmat3 turn = cameraFromWorld(other);
     return std::count_if(points.begin(), points.end(),
-                         [&](const Point& p) { return sees(other, turn, p); });
+                         [&](const SeenPoint& p) { return sees(other, turn, p); });
 }
 
 Glimpse glimpseOf(const ReferenceView& view) {
@@ -80,7 +80,7 @@ Glimpse glimpseOf(const ReferenceView& view) {
 }
 
 std::vector<int> chooseKeys(std::span<const Glimpse> glimpses, int most) {
-    std::vector<Point> points;
+    std::vector<SeenPoint> points;
     for (const Glimpse& g : glimpses) addPoints(g, points);
     std::vector<std::vector<std::uint8_t>> seen(glimpses.size());
     parallelFor(0, static_cast<std::int64_t>(glimpses.size()), [&](std::int64_t i) {

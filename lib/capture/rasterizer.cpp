@@ -37,7 +37,7 @@ int lastSample(double to, int n) {
 }
 
 /// A part of the picture, pixels; a little larger than what it is of.
-struct Box {
+struct PictureBounds {
     glm::vec2 low{0.0f}, high{0.0f};
 
     [[nodiscard]] bool holdsSample(int n) const {
@@ -54,7 +54,7 @@ struct SetUp {
     Affine edge[3];   ///< >= 0 inside; proportional to the perspective-correct barycentrics
     Affine nearness;  ///< perspective: 1/dist; orthographic: -dist
     std::uint32_t triangle = 0;
-    Box box;
+    PictureBounds box;
 };
 
 class Rasterizer {
@@ -72,7 +72,7 @@ class Rasterizer {
     /// Where the vertices are in the picture: pixels_.
     void project();
     /// False for what no sample of `samples` a pixel and side, and no pixel's centre, can see.
-    bool boxOf(std::uint32_t triangle, int samples, Box& out) const;
+    bool boxOf(std::uint32_t triangle, int samples, PictureBounds& out) const;
     /// The same, without what shows its back only, or has no area.
     bool setUp(std::uint32_t triangle, int samples, SetUp& out) const;
     /// What is seen at the samples of a tile.
@@ -133,7 +133,7 @@ void Rasterizer::project() {
     }
 }
 
-bool Rasterizer::boxOf(std::uint32_t triangle, int samples, Box& out) const {
+bool Rasterizer::boxOf(std::uint32_t triangle, int samples, PictureBounds& out) const {
     const auto& t = mesh_.triangles[triangle];
     const glm::vec2 a = pixels_[t[0]], b = pixels_[t[1]], c = pixels_[t[2]];
     const glm::vec2 size(camera_.width, camera_.height);
@@ -538,7 +538,7 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
     const int tilesX = (w + kTile - 1) / kTile, tilesY = (h + kTile - 1) / kTile;
     std::vector<std::vector<std::uint32_t>> bins(static_cast<std::size_t>(tilesX) * tilesY);
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-        Box box;
+        PictureBounds box;
         if (!boxOf(t, settings.supersampling, box)) continue;
         const glm::ivec2 first = glm::ivec2(box.low) / kTile,
                          last = glm::min(glm::ivec2(box.high), glm::ivec2(w, h) - 1) / kTile;

@@ -12,12 +12,12 @@ std::string nameOf(const AtlasRectangle& r, std::size_t index) {
 }
 
 /// What a rectangle takes on its page, the texels around it included.
-struct Box {
+struct PaddedArea {
     std::int64_t x0, y0, x1, y1;
 };
 
 /// A rectangle with `around` texels on each side, as far as its view goes.
-Box boxOf(const AtlasRectangle& r, const Camera& camera, int around) {
+PaddedArea paddedArea(const AtlasRectangle& r, const Camera& camera, int around) {
     const int left = std::min(around, r.viewX), above = std::min(around, r.viewY);
     const int right = std::min(around, camera.width - r.viewX - r.width);
     const int below = std::min(around, camera.height - r.viewY - r.height);
@@ -30,7 +30,7 @@ Box boxOf(const AtlasRectangle& r, const Camera& camera, int around) {
 /// The boxes, with their numbers, that overlap: sweeps along x and keeps what is open by y. A box
 /// that overlaps one is not kept, so there are fewer pairs than boxes.
 std::vector<std::pair<std::size_t, std::size_t>> overlapsOf(
-    const std::vector<std::pair<std::size_t, Box>>& boxes) {
+    const std::vector<std::pair<std::size_t, PaddedArea>>& boxes) {
     struct Event {
         std::int64_t x;
         bool opens;
@@ -47,7 +47,7 @@ std::vector<std::pair<std::size_t, std::size_t>> overlapsOf(
     std::vector<std::pair<std::size_t, std::size_t>> overlaps;
     std::map<std::int64_t, std::size_t> open;  // by top edge; what is open does not overlap
     for (const auto& e : events) {
-        const Box& box = boxes[e.index].second;
+        const PaddedArea& box = boxes[e.index].second;
         if (!e.opens) {
             if (const auto it = open.find(box.y0); it != open.end() && it->second == e.index)
                 open.erase(it);
@@ -66,12 +66,13 @@ std::vector<std::pair<std::size_t, std::size_t>> overlapsOf(
 }
 
 /// The boxes of the rectangles on a page, with their numbers.
-std::vector<std::pair<std::size_t, Box>> boxesOf(const Atlas& atlas, std::size_t page, int around) {
-    std::vector<std::pair<std::size_t, Box>> boxes;
+std::vector<std::pair<std::size_t, PaddedArea>> boxesOf(const Atlas& atlas, std::size_t page,
+                                                        int around) {
+    std::vector<std::pair<std::size_t, PaddedArea>> boxes;
     for (std::size_t i = 0; i < atlas.rectangles.size(); ++i) {
         const AtlasRectangle& r = atlas.rectangles[i];
         if (r.page == static_cast<int>(page))
-            boxes.emplace_back(i, boxOf(r, atlas.views[r.view].camera, around));
+            boxes.emplace_back(i, paddedArea(r, atlas.views[r.view].camera, around));
     }
     return boxes;
 }
@@ -80,7 +81,7 @@ std::vector<std::pair<std::size_t, Box>> boxesOf(const Atlas& atlas, std::size_t
 
 std::vector<std::pair<std::size_t, std::size_t>> findOverlaps(
     const std::vector<AtlasRectangle>& rectangles, int page) {
-    std::vector<std::pair<std::size_t, Box>> boxes;
+    std::vector<std::pair<std::size_t, PaddedArea>> boxes;
     for (std::size_t i = 0; i < rectangles.size(); ++i) {
         const AtlasRectangle& r = rectangles[i];
         if (r.page != page) continue;
@@ -136,8 +137,8 @@ bool Atlas::paddingHolds(int texels) const {
     for (std::size_t page = 0; page < pages.size(); ++page) {
         const auto boxes = boxesOf(*this, page, texels);
         for (const auto& [index, box] : boxes) {
-            const Box written = boxOf(rectangles[index], views[rectangles[index].view].camera,
-                                      std::min(texels, padding));
+            const PaddedArea written = paddedArea(
+                rectangles[index], views[rectangles[index].view].camera, std::min(texels, padding));
             if (box.x0 != written.x0 || box.y0 != written.y0 || box.x1 != written.x1 ||
                 box.y1 != written.y1 || box.x0 < 0 || box.y0 < 0 || box.x1 > width() ||
                 box.y1 > height())

@@ -12,15 +12,16 @@ namespace {
 
 // Chosen by trial on the sets of tests/bench/pictures.md with noise added.
 
-/// The second time the points of all views are nearer to each other, and more of them agree.
+/// Rounds: in the second one the points of all views are nearer to each other, so that more of them
+/// agree.
 constexpr int kAgreementRounds = 2;
 /// Surfaces further apart than so many standard deviations are not the same.
 constexpr float kAgreementBand = 3.0f;
-/// A view that sees the surface along it says nothing: the least share of what a
-/// surface across its rays would change by.
+/// The least slope of a surface against the rays of a view, as a share of that of a surface across
+/// them: a view that looks along the surface tells nothing of its depth.
 constexpr float kFacing = 0.2f;
-/// Points that few views confirm are further off than the mean: what is left counts as so many
-/// times that.
+/// The noise that is left counts as so many times what the formula gives, since points that few
+/// views confirm are off by more than the mean.
 constexpr float kUnconfirmed = 1.25f;
 
 /// What a partner says of a point: how far it is to move, in q, and the variance of that.
@@ -33,7 +34,7 @@ Opinion opinionOf(const Partner& p, const DepthAxis& axis, float x, float y, flo
     if (!s.found) return {};
     const float across = p.view->space->axis.qPerUnit(s.shown) / axis.qPerUnit(q);
     if (!(std::abs(s.rate) > kFacing * across)) return {};
-    // Seen from behind it may be the other side of something thick: points on the right side of it
+    // A view from behind may see the other side of something thick: points on the right side of it
     // stay where they are.
     if (s.rate < 0.0f && s.off >= 0.0f) return {};
     const float doubt = s.doubt / s.rate;

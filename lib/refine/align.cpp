@@ -65,7 +65,7 @@ class Round {
         if (glm::dot(apart, apart) < kTellsApart) return 0;
         return colours.shareOf(glm::vec3(texture_.at(x, y)));
     }
-    /// Its colour may be a mixture.
+    /// Whether a pixel lies beside an edge, where its colour may be a mixture.
     [[nodiscard]] bool besideEdge(int x, int y) const {
         for (const auto& d : kBeside) {
             const int u = x + d[0], v = y + d[1];

@@ -8,10 +8,10 @@
 namespace stx {
 namespace {
 
-/// Too dark or too bright to tell light: clipped, or nothing but noise.
+/// Colours outside of this range (0..1) do not count: they are clipped, or nothing but noise.
 constexpr double kDarkest = 0.03, kBrightest = 0.97;
-/// Fewer points than these tell no light. Each place counts twice, once for either view: with 50,
-/// bars of 126 pixels that one view of 26x19 showed changed by 1.8 %.
+/// The fewest points from which a light is measured. Each place counts twice, once for either view:
+/// with 50, bars of 126 pixels that one view of 26x19 showed changed by 1.8 %.
 constexpr std::size_t kFewColours = 100;
 /// Points further from the line than so many standard deviations do not count (Tukey's biweight:
 /// 95 % of the efficiency of least squares under normal noise). At first more do, since surfaces
@@ -20,14 +20,14 @@ constexpr double kBiweight = 4.685;
 constexpr std::array<double, 8> kLeastBand = {0.2, 0.14, 0.1, 0.07, 0.04, 0, 0, 0};
 /// A median of absolute values is this share of a standard deviation.
 constexpr double kMedianOfNormal = 0.6745;
-/// What rounding to 8 bits leaves.
+/// The error that rounding to 8 bits leaves (0..1).
 constexpr double kHalfStep = 0.5 / 255;
 constexpr double kMostGain = 2.0, kMostOffset = 0.25;
-/// Means of colours are off by this much however many points there are: lights have shapes.
+/// The error of a mean of colours however many points there are, since light varies over a surface.
 constexpr double kMiddleDoubt = 0.001;
 /// The variance of a ratio of spreads of colours that have nothing to do with each other.
 constexpr double kLooseDoubt = 0.25;
-/// Offsets are about so large; where colours hardly spread, what differs is taken for a gain.
+/// The usual size of an offset; where colours hardly spread, a difference is taken for a gain.
 constexpr double kUsualOffset = 0.01;
 /// A difference is one when it is as many times what pairs contradict each other by, and at least
 /// this large. Views of one light that are a few pixels wide come to 5.8 steps of 8 bits and to
@@ -42,7 +42,7 @@ constexpr double kSure = 1.5;
 /// the first is sampling, as where views show a plate edge on. Exact sets come to 0.32 at most, a
 /// kitchen of 7-Scenes to 0.52, one darkened view of 6 to 40 to 0.82 and more.
 constexpr double kWorth = 0.35, kSureWorth = 0.46;
-/// Weight of "nothing differs", beside which lines weigh thousands.
+/// The weight of the assumption that views do not differ; lines weigh thousands.
 constexpr double kNothingDiffers = 1e-2;
 constexpr int kSweeps = 2000;
 constexpr double kSettled = 1e-8;

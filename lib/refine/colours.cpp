@@ -12,15 +12,16 @@ namespace {
 
 // Chosen by trial on the sets of tests/bench/pictures.md with noise added.
 
-/// The second time points are nearer to where they belong.
+/// Rounds: in the second one points are nearer to where they belong.
 constexpr int kColourRounds = 2;
-/// Views that a view is compared with.
+/// The views that each view is compared with.
 constexpr std::size_t kColourPartners = 8;
 /// Points are moved together with those around them, within so many pixels that are on one surface
 /// within so many standard deviations.
 constexpr int kWindow = 1;
 constexpr float kWindowBand = 4.0f;
-/// What colours of one point differ by all the same, 0..1, and from how much on they count less.
+/// Colours of one point differ by this much in two views (0..1); differences beyond the second
+/// count less.
 constexpr float kColourNoise = 0.04f, kColourBand = 0.06f;
 /// Another view shows the surface of a point within so many standard deviations.
 constexpr float kShownBand = 4.0f;
@@ -55,7 +56,8 @@ struct Pull {
 
 Pull pullOf(const Beside& other, float x, float y, float q, float scale, float light, float doubt) {
     const ShownSurface s = surfaceShownBy(*other.view, other.warp, x, y, q);
-    // A point that is off by its doubt is off by so much beside the surface that is shown.
+    // The distance, beside the surface that the other view shows, by which a point is off whose
+    // depth is off by its doubt.
     const float own = s.rate * doubt;
     if (!s.found || !(s.rate > 0.0f) ||
         s.off * s.off > kShownBand * kShownBand * (own * own + s.doubt * s.doubt))

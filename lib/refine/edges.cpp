@@ -16,9 +16,10 @@ namespace {
 
 /// An edge is a jump of more than this share of q, and so many times what q changes by beside it.
 constexpr float kJumpOfEdge = 0.005f, kBesideSlope = 3.0f;
-/// And of so many steps of a depth code.
+/// It is a jump of more than so many steps of a depth code, too.
 constexpr float kJumpSteps = 2.5f;
-/// And of so many standard deviations of noise, of which smoothing leaves some at single pixels.
+/// And of more than so many standard deviations of noise, of which smoothing leaves some at single
+/// pixels.
 constexpr float kJumpNoises = 3.0f;
 /// Squared distance of two colours (0..1 each) that tell surfaces apart.
 constexpr float kContrast = 3 * 0.04f * 0.04f;

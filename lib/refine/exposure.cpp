@@ -37,17 +37,17 @@ class Samples {
         for (const Camera& c : cameras) cameraFromWorld_.push_back(c.cameraFromWorld());
     }
 
-    struct Point {
+    struct ColourPoint {
         glm::dvec3 world;
         glm::dvec3 normal;  ///< of the surface; of single pixels: towards their camera
         glm::vec3 colour;
     };
-    [[nodiscard]] std::vector<Point> pointsOf(std::size_t view) const {
+    [[nodiscard]] std::vector<ColourPoint> pointsOf(std::size_t view) const {
         const Camera& c = cameras_[view];
         const double pixels = static_cast<double>(c.width) * c.height;
         const double wanted = radius_ > 0 ? kPoints : kPointsOfLeaves;
         const int step = std::max(1, static_cast<int>(std::sqrt(pixels / wanted)));
-        std::vector<Point> points;
+        std::vector<ColourPoint> points;
         for (int y = step / 2; y < c.height; y += step) {
             for (int x = step / 2; x < c.width; x += step) {
                 const float depth = depthAt(view, x, y);
@@ -70,7 +70,8 @@ class Samples {
     }
 
     /// What a view shows of a point; nothing when something else is there.
-    [[nodiscard]] std::optional<glm::vec3> shownAt(std::size_t view, const Point& point) const {
+    [[nodiscard]] std::optional<glm::vec3> shownAt(std::size_t view,
+                                                   const ColourPoint& point) const {
         const Camera& c = cameras_[view];
         // The other side of a sheet is another surface.
         if (!(glm::dot(point.normal, towards(c, point.world)) > kFromTheFront)) return {};
@@ -149,7 +150,7 @@ Result<std::vector<SharedColours>> sharedColours(std::span<const Camera> cameras
                                                  int radius) {
     const std::size_t views = cameras.size();
     const Samples samples(cameras, partOf, radius);
-    std::vector<std::vector<Samples::Point>> points(views);
+    std::vector<std::vector<Samples::ColourPoint>> points(views);
     STX_CHECK(each([&](std::size_t v) { points[v] = samples.pointsOf(v); }));
     // How much of each view another shows.
     std::vector<std::vector<std::uint16_t>> shown(views, std::vector<std::uint16_t>(views));
@@ -168,7 +169,8 @@ Result<std::vector<SharedColours>> sharedColours(std::span<const Camera> cameras
     STX_CHECK(each([&](std::size_t at) {
         const auto coloursOf = [&](std::size_t v) {
             Colours colours;
-            for (const Samples::Point& p : points[v]) colours.push_back(samples.shownAt(at, p));
+            for (const Samples::ColourPoint& p : points[v])
+                colours.push_back(samples.shownAt(at, p));
             return colours;
         };
         for (std::size_t i = 0; i < pairs.size(); ++i) {

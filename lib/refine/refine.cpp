@@ -24,8 +24,8 @@ constexpr const char* kFound = "where it is found";
 constexpr std::array<RefineStepInfo, kRefineSteps> kSteps{{
     {steps, "steps", kImport, known, "8-bit depth",
      "stairs of depth in coarse codes are smoothed within half a step", ""},
-    {shift, "shift", kImport, known, "Middlebury 2006",
-     "disparities that were cut off instead of rounded move to where other pictures of the set show them", ""},
+    {shift, "shift", kImport, known, "Middlebury 2003 to 2006",
+     "disparities and rows that are a part of a pixel off move to where other pictures of the set show them", ""},
     {reproject, "reproject", kImport, known, "7-Scenes; depth cameras that are given",
      "depth that a camera of its own took is seen from the colour camera", ""},
     {mixed, "mixed", kBoth, known, "sensors and reconstructions (TUM, 7-Scenes, COLMAP)",

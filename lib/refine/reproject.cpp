@@ -35,7 +35,7 @@ double distanceAtCorner(const Image<float>& depth, int x, int y, int dx, int dy)
 void drawNearest(Image<float>& inverse, const glm::dvec3& a, const glm::dvec3& b,
                  const glm::dvec3& c) {
     const double area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-    // Its back, which only noise turns here.
+    // The back of a triangle, which only noise turns to this camera.
     if (!(area > 0)) return;
     const auto first = [](double least, double size) {
         return static_cast<int>(std::ceil(std::clamp(least - 0.5, 0.0, size)));
@@ -84,7 +84,7 @@ Result<Image<float>> depthSeenBy(const Camera& to, const RealFromIdeal& lens,
                 inside |= at.x >= 0 && at.y >= 0 && at.x <= to.width && at.y <= to.height;
                 corners[i] = {lens ? lens(glm::dvec2(at)) : glm::dvec2(at), 1.0 / at.z};
             }
-            // What is far outside the picture, a lens' formula may fold into it.
+            // A formula of a lens may fold what is far outside into the picture.
             if (behind || (!inside && lens)) continue;
             drawNearest(inverse, corners[0], corners[1], corners[2]);
             drawNearest(inverse, corners[0], corners[2], corners[3]);

@@ -23,8 +23,8 @@ constexpr int kLeastAlike = 3;
 /// instead of 50.8 and 26.8.
 constexpr float kSteepest = 5.0f;
 
-/// Another view shows a stray, or sees past it, unless its surface is before it by more than so
-/// many standard deviations of both.
+/// Another view sees past a stray when its surface is behind it by more than so many standard
+/// deviations of both.
 constexpr float kBand = 3.0f;
 
 /// Whether a point is on one surface with enough of those around it.
@@ -55,14 +55,20 @@ bool isOnSurface(const NoisyView& view, int x, int y) {
     return alike >= kLeastAlike;
 }
 
-/// Whether another view shows a point, or sees past it.
-bool isSeenBy(const Partner& p, const NoisyView& view, int x, int y) {
+/// Whether a pixel and those beside it show background; what is not known is below 0.
+bool isClear(const Image<float>& q, int x, int y) {
+    for (const auto& [dx, dy] : {std::pair(0, 0), {1, 0}, {-1, 0}, {0, 1}, {0, -1}})
+        if (q.contains(x + dx, y + dy) && q.at(x + dx, y + dy) != 0.0f) return false;
+    return true;
+}
+
+/// Whether another view sees past a point.
+bool isSeenPast(const Partner& p, const NoisyView& view, int x, int y) {
     const float q = view.q->at(x, y), own = view.surface.at(x, y).z;
     const ShownSurface s = surfaceShownBy(*p.view, p.warp, static_cast<float>(x) + 0.5f,
                                           static_cast<float>(y) + 0.5f, q);
-    // Background; what is not known is below 0.
-    if (!s.found) return s.inside && s.shown == 0.0f;
-    return s.off <= kBand * std::hypot(own * s.rate, s.doubt);
+    if (!s.found) return s.inside && isClear(*p.view->q, int(s.u), int(s.v));
+    return s.off < -kBand * std::hypot(own * s.rate, s.doubt);
 }
 
 /// The strays of one view.
@@ -75,7 +81,7 @@ Image<std::uint8_t> straysOf(std::span<const NoisyView> views, std::size_t numbe
             for (int x = 0; x < strays.width(); ++x)
                 strays.at(x, y) = view.q->at(x, y) > 0.0f && !isOnSurface(view, x, y) &&
                                   std::ranges::any_of(partners, [&](const Partner& p) {
-                                      return isSeenBy(p, view, x, y);
+                                      return isSeenPast(p, view, x, y);
                                   });
     });
     return strays;

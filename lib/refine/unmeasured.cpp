@@ -18,7 +18,7 @@ namespace {
 
 // Chosen by trial on the captured sets of tests/bench/pictures.md.
 
-/// So many times the farthest point of all views is far away.
+/// "Far away" is so many times the distance of the farthest point of all views.
 constexpr double kFarTimes = 1000.0;
 /// Views that a view is compared with.
 constexpr std::size_t kComparedViews = 4;
@@ -32,7 +32,7 @@ constexpr float kMostDifferent = 0.12f;
 constexpr float kSamePlaceThere = 0.02f;
 /// Planes that differ by this share of q are one.
 constexpr float kSamePlane = 0.0005f;
-/// A pixel without any view that tells differs by so much.
+/// The difference that a pixel gets which no other view shows.
 constexpr float kUntold = 0.06f;
 /// How much changes of colour on the way from the measured point count, and up to what sum.
 constexpr float kPathWeight = 0.1f, kLongestPath = 0.3f;
@@ -126,7 +126,7 @@ class Spreading {
         return glm::vec3(glm::u8vec3(colours_.at(x, y))) * (1.0f / 255.0f);
     }
 
-    /// What the samples around a pixel count.
+    /// Finds the weights of the samples around a pixel.
     void lookAround(int x, int y) {
         const glm::vec3 middle = colour(x, y);
         std::size_t k = 0;
@@ -257,7 +257,7 @@ class Spreading {
     std::array<float, kSamplesASide * kSamplesASide> weights_{};
 };
 
-/// What all steps need of a view.
+/// What all steps need to know of a view.
 struct Looked {
     PixelSpace space;
     Image<float> q;

@@ -42,7 +42,7 @@ OfPair measured(const DepthView& from, const DepthView& to, double tolerance) {
     const CommonPoints common = commonPoints(from, to, kMeasured, tolerance);
     if (common.points.size() < kFewestPoints) return {};
     std::vector<double> apart, own, there;
-    for (const CommonPoints::Point& p : common.points) {
+    for (const CommonPoints::CommonPoint& p : common.points) {
         apart.push_back(std::abs(p.at - p.shown) / p.at);
         own.push_back(p.own);
         there.push_back(p.at);

@@ -26,13 +26,13 @@ struct DepthSample {
 
 /// What two views both show, on a grid of pixels of the first.
 struct CommonPoints {
-    struct Point {
+    struct CommonPoint {
         double own;    ///< its distance from the view it is of
         double at;     ///< from the other one
         double shown;  ///< what the other one shows there
     };
     int asked = 0;  ///< pixels of the grid that have a point
-    std::vector<Point> points;
+    std::vector<CommonPoint> points;
 
     [[nodiscard]] double overlap() const {
         return asked > 0 ? static_cast<double>(points.size()) / asked : 0;

@@ -53,20 +53,20 @@ double largestSum(std::vector<double> gains, std::size_t count) {
 /// Lazy greedy over `candidates`; alone[v] is the value of each view by itself.
 void greedy(const CoverProblem& problem, const std::vector<int>& candidates, std::size_t most,
             double enough, const std::vector<double>& alone, CoverSolution& solution) {
-    struct Entry {
+    struct QueuedView {
         double gain;
         int view;
         std::size_t round;
-        bool operator<(const Entry& o) const {
+        bool operator<(const QueuedView& o) const {
             return gain != o.gain ? gain < o.gain : view > o.view;
         }
     };
     Best best(problem.weights.size(), 0.0f);
-    std::priority_queue<Entry> queue;
+    std::priority_queue<QueuedView> queue;
     for (const int v : candidates) queue.push({alone[v], v, 0});
     double value = 0;
     while (!queue.empty() && solution.chosen.size() < most && value < enough) {
-        Entry top = queue.top();
+        QueuedView top = queue.top();
         queue.pop();
         const std::size_t round = solution.chosen.size() + 1;
         if (top.round != round) {

@@ -144,11 +144,11 @@ Result<Sheet> sheetOf(const ViewTable& table, const SheetSettings& settings, Job
 
 Result<Sheet> sheetOf(const Atlas& atlas, const SheetSettings& settings, Job& job) {
     STX_CHECK(atlas.check());
-    struct Kind {
+    struct AtlasTexture {
         const char* name;
         int page;
     };
-    std::vector<Kind> textures;
+    std::vector<AtlasTexture> textures;
     for (int page = 0; page < static_cast<int>(atlas.pages.size()); ++page) {
         const AtlasPage& p = atlas.pages[static_cast<std::size_t>(page)];
         textures.push_back({"colour", page});
@@ -167,7 +167,7 @@ Result<Sheet> sheetOf(const Atlas& atlas, const SheetSettings& settings, Job& jo
     std::vector<SheetGroup> groups;
     for (int i = 0; i < plan.shown; ++i) {
         STX_CHECK(job.checkCancelled());
-        const Kind& kind = textures[static_cast<std::size_t>(plan.groupAt(i))];
+        const AtlasTexture& kind = textures[static_cast<std::size_t>(plan.groupAt(i))];
         const AtlasPage& page = atlas.pages[static_cast<std::size_t>(kind.page)];
         const std::string_view name = kind.name;
         Tile tile = name == "colour"     ? colourTile(page.texture, plan.cell)

@@ -67,6 +67,7 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
     uint others = 0u;  // do not show it
     uint closelyBehind = 0u;  // show something there, and not by an extension
     bool guess = (flags & kExtensionBit) != 0u;
+    bool outermost = guess && beyondCentres(self, x, y, q);
     float within = sameWithin(q), close = kLinkedSamples * relativeScale(frameAxis(), q);
     for (int k = 0; k < int(tile.count); ++k) {
         if (k == own) continue;
@@ -90,7 +91,7 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
         if ((others >> k & 1u) == 0u) continue;
         int vote = voteOf(sourceOf(k), x, y, q, facet);
         if (guess && vote == kNoVote && (closelyBehind >> k & 1u) != 0u && facet.any &&
-            sizeIn(sourceOf(k), facet, warp(sourceOf(k), x, y, q)) > kSeesBetter)
+            (outermost || sizeIn(sourceOf(k), facet, warp(sourceOf(k), x, y, q)) > kSeesBetter))
             return true;
         votes += vote;
     }

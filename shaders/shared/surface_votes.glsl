@@ -185,6 +185,15 @@ float sizeIn(int s, IN(Facet) facet, vec4 h) {
     return abs(area) * texel * texel / facet.area;
 }
 
+// Whether a point of the frame lies beyond the outermost pixel centres of a source. What the source shows
+// there continues its outermost pixels: a tangent, beside which round surfaces lie behind.
+bool beyondCentres(int s, float x, float y, float q) {
+    vec4 h = warp(s, x, y, q);
+    float u = h.x / h.w, v = h.y / h.w;
+    ivec2 size = sizeOf(s);
+    return min(min(u, float(size.x) - u), min(v, float(size.y) - v)) < 0.5f;
+}
+
 // The vote of a source that votes on the point (x, y, q) of the frame, which is of this facet. Of a surface
 // that it sees edge on, all is outline, and where that is its pixels tell to a part of one only: it must see
 // past what is so far behind the point, too.

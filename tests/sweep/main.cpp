@@ -20,9 +20,9 @@ namespace {
 struct Options {
     std::uint64_t seed = 1;
     int first = 0, cases = 1;
-    std::string set;   ///< changes of fields
-    std::string rule;  ///< only this one, in every case
-    std::string keep;  ///< folder for the files of a case
+    std::string set;                ///< changes of fields
+    std::vector<std::string> only;  ///< these rules, in every case
+    std::string keep;               ///< folder for the files of a case
     bool measure = false;
     bool reduce = true;
 };
@@ -158,7 +158,8 @@ int check(const Options& options) {
         Random random(options.seed * 9176 + static_cast<std::uint64_t>(number) * 13 + 1);
         for (const SweepRule& rule : rules()) {
             const bool asked = random.chance(rule.share);
-            if (options.rule.empty() ? !asked : options.rule != rule.name) continue;
+            if (options.only.empty() ? !asked : !std::ranges::count(options.only, rule.name))
+                continue;
             if (options.measure) {
                 const auto start = std::chrono::steady_clock::now();
                 const auto measured = rule.measure(pictures);
@@ -198,7 +199,7 @@ int main(int argc, char** argv) {
     app.add_option("--first", options.first, "number of the first case");
     app.add_option("--cases", options.cases, "how many");
     app.add_option("--set", options.set, "fields to change, as in views=3,width=24");
-    app.add_option("--rule", options.rule, "only this rule, in every case");
+    app.add_option("--rule", options.only, "only this rule, in every case; again for more");
     app.add_option("--keep", options.keep, "folder for the files of a case");
     app.add_flag("--measure", options.measure, "prints what the rules measure, judges nothing");
     app.add_flag("--reduce,!--no-reduce", options.reduce,

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "tests/naive_warp.hpp"
@@ -22,16 +25,31 @@ struct Recorded {
     }
 };
 
-/// The nearest point of all views in each pixel.
-NaiveWarp warpOfAll(const Bundle& bundle, const Camera& to) {
-    NaiveWarp out = naiveWarp(bundle.views.front(), to);
+/// The nearest point of all views in each pixel. Where a texel is `texel` pixels wide and that is
+/// more than one, a point fills as many: single pixels would be judged at the points alone, where
+/// each view knows the colour.
+NaiveWarp warpOfAll(const Bundle& bundle, const Camera& to, double texel) {
+    const auto reduced = [&](int size) { return std::max(1, int(std::lround(size / texel))); };
+    const Camera camera = texel > 1 ? to.resized(reduced(to.width), reduced(to.height)) : to;
+    NaiveWarp warp = naiveWarp(bundle.views.front(), camera);
     for (std::size_t i = 1; i < bundle.views.size(); ++i) {
-        const NaiveWarp other = naiveWarp(bundle.views[i], to);
-        for (std::size_t k = 0; k < out.picture.count(); ++k) {
-            if (!(other.distance.data()[k] < out.distance.data()[k])) continue;
-            out.picture.data()[k] = other.picture.data()[k];
-            out.covered.data()[k] = other.covered.data()[k];
-            out.distance.data()[k] = other.distance.data()[k];
+        const NaiveWarp other = naiveWarp(bundle.views[i], camera);
+        for (std::size_t k = 0; k < warp.picture.count(); ++k) {
+            if (!(other.distance.data()[k] < warp.distance.data()[k])) continue;
+            warp.picture.data()[k] = other.picture.data()[k];
+            warp.covered.data()[k] = other.covered.data()[k];
+            warp.distance.data()[k] = other.distance.data()[k];
+        }
+    }
+    if (camera.width == to.width && camera.height == to.height) return warp;
+    NaiveWarp out{Image<glm::u8vec4>(to.width, to.height), Image<std::uint8_t>(to.width, to.height),
+                  Image<float>(to.width, to.height)};
+    for (int y = 0; y < to.height; ++y) {
+        for (int x = 0; x < to.width; ++x) {
+            const int u = x * camera.width / to.width, v = y * camera.height / to.height;
+            out.picture.at(x, y) = warp.picture.at(u, v);
+            out.covered.at(x, y) = warp.covered.at(u, v);
+            out.distance.at(x, y) = warp.distance.at(u, v);
         }
     }
     return out;
@@ -45,7 +63,8 @@ Outcome recordedBelowWarp(Pictures& pictures) {
     if (pictures.seenCount(1) < kFewest) return std::nullopt;
     const Recorded recorded(pictures);
     const Camera& novel = pictures.captured().novel;
-    const NaiveWarp warp = warpOfAll(recorded.bundle, novel);
+    const NaiveWarp warp =
+        warpOfAll(recorded.bundle, novel, pictures.captured().from.magnification);
     Frame warped;
     warped.colour = Image<glm::vec4>(novel.width, novel.height, glm::vec4(0));
     for (std::size_t k = 0; k < warp.picture.count(); ++k) {

@@ -1,6 +1,7 @@
 #include "tests/sweep/sensor.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -26,19 +27,36 @@ void addNoise(ReferenceView& view, std::size_t number, double share, double usua
     }
 }
 
+/// Whether depth jumps from `front` to the pixel beside it: by a twentieth of the distance, and by
+/// three times what it changes by on either side of the step. So the slopes of walls and the limbs
+/// of balls, which a few pixels show steep, are no jumps.
+bool jumps(const Image<float>& depth, glm::ivec2 front, glm::ivec2 step) {
+    const auto at = [&](glm::ivec2 p) {
+        return depth.contains(p.x, p.y) ? depth.at(p.x, p.y) : kNoDepth;
+    };
+    const float near = at(front), far = at(front + step);
+    if (!hasPoint(near) || !hasPoint(far) || !(near < 0.95f * far)) return false;
+    const float before = at(front - step), behind = at(front + 2 * step);
+    const float slope = std::max(hasPoint(before) ? std::abs(near - before) : 0.0f,
+                                 hasPoint(behind) ? std::abs(behind - far) : 0.0f);
+    return far - near > 3 * slope;
+}
+
 /// Surfaces in front reach over those behind them by so many pixels, where depth jumps.
 void moveEdges(ReferenceView& view, int pixels) {
-    constexpr float kJump =
-        0.95f;  // of the distance; surfaces that are seen at a slant change less
+    constexpr std::array<glm::ivec2, 4> kSides{{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
     const Image<float> before = view.depth;
     for (int y = 0; y < before.height(); ++y) {
         for (int x = 0; x < before.width(); ++x) {
-            const float dist = before.at(x, y);
-            if (!hasPoint(dist)) continue;
+            if (std::ranges::none_of(kSides, [&](glm::ivec2 s) {
+                    return jumps(before, {x, y}, s);
+                }))
+                continue;
             for (int v = y - pixels; v <= y + pixels; ++v) {
                 for (int u = x - pixels; u <= x + pixels; ++u) {
-                    if (!before.contains(u, v) || !(before.at(u, v) < kJump * dist)) continue;
-                    view.depth.at(x, y) = std::min(view.depth.at(x, y), before.at(u, v));
+                    if (!before.contains(u, v) || !hasPoint(before.at(u, v))) continue;
+                    float& moved = view.depth.at(u, v);
+                    moved = std::min(moved, before.at(x, y));
                 }
             }
         }

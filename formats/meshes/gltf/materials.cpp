@@ -55,93 +55,114 @@ MaterialUse Materials::withoutTextures(const MaterialUse& use, TexturesKept kept
     return result;
 }
 
+namespace {
+
+Result<UvSource> uvSourceOf(const Json& info, const std::string& where) {
+    // No mesh has so many sets.
+    constexpr std::uint64_t kMostSets = 1000;
+    UvSource uv;
+    STX_TRY(const auto set, getUint(info, "texCoord", where));
+    uv.set = static_cast<int>(std::min(set.value_or(0), kMostSets));
+    STX_TRY(const Json* transform, getExtension(info, "KHR_texture_transform", where));
+    if (!transform) return uv;
+    const auto at = where + ".extensions.KHR_texture_transform";
+    STX_CHECK(getNumbers(*transform, "offset", at, {&uv.offset.x, 2}));
+    STX_CHECK(getNumbers(*transform, "scale", at, {&uv.scale.x, 2}));
+    STX_TRY(const auto rotation, getNumber(*transform, "rotation", at));
+    uv.rotation = rotation.value_or(0);
+    STX_TRY(const auto override, getUint(*transform, "texCoord", at));
+    if (override) uv.set = static_cast<int>(std::min(*override, kMostSets));
+    return uv;
+}
+
+/// glTF 2.0, 5.26; without a `sampler` the defaults.
+Result<SamplerState> samplerOf(const Json& root, std::optional<std::uint64_t> sampler,
+                               const std::string& textureWhere) {
+    SamplerState state;
+    if (!sampler) return state;
+    STX_TRY(const Json* s, element(root, "samplers", *sampler, textureWhere));
+    const auto where = fmt::format("samplers[{}]", *sampler);
+    const auto wrap = [&](const char* key) -> Result<MeshTexture::Wrap> {
+        STX_TRY(const auto value, getUint(*s, key, where));
+        switch (value.value_or(10497)) {
+            case 10497:
+                return MeshTexture::Wrap::repeat;
+            case 33071:
+                return MeshTexture::Wrap::clamp;
+            case 33648:
+                return MeshTexture::Wrap::mirror;
+            default:
+                return fail(ErrorCode::invalidInput, "{}.{} is {}, expected 10497, 33071 or 33648",
+                            where, key, *value);
+        }
+    };
+    STX_TRY(state.wrapU, wrap("wrapS"));
+    STX_TRY(state.wrapV, wrap("wrapT"));
+    STX_TRY(const auto filter, getUint(*s, "magFilter", where));
+    state.nearest = filter.value_or(9729) == 9728;
+    return state;
+}
+
+}  // namespace
+
 Result<int> Materials::texture(const Json& info, const std::string& where, UvSource& uv) {
     STX_TRY(const auto index, getUint(info, "index", where));
     if (!index) return fail(ErrorCode::invalidInput, "{} has no index of a texture", where);
-    STX_TRY(const auto set, getUint(info, "texCoord", where));
-    uv = {};
-    uv.set = static_cast<int>(std::min<std::uint64_t>(set.value_or(0), 1000));
-    STX_TRY(const Json* transform, getExtension(info, "KHR_texture_transform", where));
-    if (transform) {
-        const auto at = where + ".extensions.KHR_texture_transform";
-        STX_CHECK(getNumbers(*transform, "offset", at, {&uv.offset.x, 2}));
-        STX_CHECK(getNumbers(*transform, "scale", at, {&uv.scale.x, 2}));
-        STX_TRY(const auto rotation, getNumber(*transform, "rotation", at));
-        uv.rotation = rotation.value_or(0);
-        STX_TRY(const auto override, getUint(*transform, "texCoord", at));
-        if (override) uv.set = static_cast<int>(std::min<std::uint64_t>(*override, 1000));
-    }
-
+    STX_TRY(uv, uvSourceOf(info, where));
     STX_TRY(const Json* object, element(model_.root(), "textures", *index, where));
     const auto textureWhere = fmt::format("textures[{}]", *index);
-    SamplerState state;
     STX_TRY(const auto sampler, getUint(*object, "sampler", textureWhere));
-    if (sampler) {
-        STX_TRY(const Json* s, element(model_.root(), "samplers", *sampler, textureWhere));
-        const auto samplerWhere = fmt::format("samplers[{}]", *sampler);
-        const auto wrap = [&](const char* key) -> Result<MeshTexture::Wrap> {
-            STX_TRY(const auto value, getUint(*s, key, samplerWhere));
-            switch (value.value_or(10497)) {
-                case 10497:
-                    return MeshTexture::Wrap::repeat;
-                case 33071:
-                    return MeshTexture::Wrap::clamp;
-                case 33648:
-                    return MeshTexture::Wrap::mirror;
-                default:
-                    return fail(ErrorCode::invalidInput,
-                                "{}.{} is {}, expected 10497, 33071 or 33648", samplerWhere, key,
-                                *value);
-            }
-        };
-        STX_TRY(state.wrapU, wrap("wrapS"));
-        STX_TRY(state.wrapV, wrap("wrapT"));
-        STX_TRY(const auto filter, getUint(*s, "magFilter", samplerWhere));
-        state.nearest = filter.value_or(9729) == 9728;
-    }
+    STX_TRY(const SamplerState state, samplerOf(model_.root(), sampler, textureWhere));
+    STX_TRY(const auto source, imageOf(*object, textureWhere));
+    if (!source) return -1;
+    STX_TRY(const int result, readImage(*source, textureWhere, state));
+    uv.used = result >= 0;
+    return result;
+}
 
-    STX_TRY(auto source, getUint(*object, "source", textureWhere));
-    STX_TRY(const Json* webp, getExtension(*object, "EXT_texture_webp", textureWhere));
+Result<std::optional<std::uint64_t>> Materials::imageOf(const Json& texture,
+                                                        const std::string& where) {
+    STX_TRY(auto source, getUint(texture, "source", where));
+    STX_TRY(const Json* webp, getExtension(texture, "EXT_texture_webp", where));
     if (webp) {
-        STX_TRY(const auto webpSource, getUint(*webp, "source", textureWhere));
+        STX_TRY(const auto webpSource, getUint(*webp, "source", where));
         if (webpSource) source = webpSource;
     }
-    STX_TRY(const Json* basis, getExtension(*object, "KHR_texture_basisu", textureWhere));
-    if (!source && basis) {
+    STX_TRY(const Json* basis, getExtension(texture, "KHR_texture_basisu", where));
+    if (!source)
         model_.job().note(
-            fmt::format("{} is in Basis Universal (KHR_texture_basisu), which cannot be decoded "
-                        "here: the plain "
-                        "colour is used; export PNG or JPEG textures, or give one with --texture",
-                        textureWhere));
-        return -1;
-    }
-    if (!source) {
-        model_.job().note(fmt::format(
-            "{} names no image that can be read; the plain colour is used", textureWhere));
-        return -1;
-    }
-    STX_TRY(const Json* image, element(model_.root(), "images", *source, textureWhere));
-    const auto imageWhere = fmt::format("images[{}]", *source);
-    STX_TRY(const auto uri, getString(*image, "uri", imageWhere));
-    STX_TRY(const auto view, getUint(*image, "bufferView", imageWhere));
+            basis ? fmt::format(
+                        "{} is in Basis Universal (KHR_texture_basisu), which cannot be decoded "
+                        "here: the plain colour is used; export PNG or JPEG textures, or give one "
+                        "with --texture",
+                        where)
+                  : fmt::format("{} names no image that can be read; the plain colour is used",
+                                where));
+    return source;
+}
+
+Result<int> Materials::readImage(std::uint64_t index, const std::string& textureWhere,
+                                 const SamplerState& state) {
+    STX_TRY(const Json* image, element(model_.root(), "images", index, textureWhere));
+    const auto where = fmt::format("images[{}]", index);
+    STX_TRY(const auto uri, getString(*image, "uri", where));
+    STX_TRY(const auto view, getUint(*image, "bufferView", where));
     auto& textures = builder_.textures();
-    int result = -1;
     if (uri && !uri->starts_with("data:")) {
         auto name = percentDecoded(*uri);
         if (name != *uri && resolveInside(model_.files().folder(), *uri, model_.job().limits))
             name = *uri;
-        STX_TRY(result, model_.files().textureFromFile(name, state, textures));
-    } else if (uri) {
-        STX_TRY(const auto bytes, model_.uri(*uri, imageWhere));
-        STX_TRY(result, model_.files().textureFromBytes(bytes, imageWhere, state, textures));
-    } else if (view) {
-        STX_TRY(const auto bytes, model_.bufferView(*view, imageWhere));
-        STX_TRY(result, model_.files().textureFromBytes(bytes.bytes, imageWhere, state, textures));
-    } else {
-        return fail(ErrorCode::invalidInput, "{} has neither a uri nor a bufferView", imageWhere);
+        return model_.files().textureFromFile(name, state, textures);
     }
-    uv.used = result >= 0;
-    return result;
+    if (uri) {
+        STX_TRY(const auto bytes, model_.uri(*uri, where));
+        return model_.files().textureFromBytes(bytes, where, state, textures);
+    }
+    if (view) {
+        STX_TRY(const auto bytes, model_.bufferView(*view, where));
+        return model_.files().textureFromBytes(bytes.bytes, where, state, textures);
+    }
+    return fail(ErrorCode::invalidInput, "{} has neither a uri nor a bufferView", where);
 }
 
 Result<void> Materials::readEmissive(const Json& object, const std::string& where, Material& m,

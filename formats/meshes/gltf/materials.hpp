@@ -56,7 +56,13 @@ class Materials {
     [[nodiscard]] Result<void> readMetallicRoughness(const Json* base, bool glossy,
                                                      const std::string& where, Material& m,
                                                      MaterialUse& use);
+    /// The mesh's texture that `info` names, -1 (with a note) where it cannot be read.
     [[nodiscard]] Result<int> texture(const Json& info, const std::string& where, UvSource& uv);
+    /// Which of the file's images a texture shows; none (with a note) where none can be read.
+    [[nodiscard]] Result<std::optional<std::uint64_t>> imageOf(const Json& texture,
+                                                               const std::string& where);
+    [[nodiscard]] Result<int> readImage(std::uint64_t index, const std::string& textureWhere,
+                                        const SamplerState& state);
 
     GltfFile& model_;
     MeshBuilder& builder_;

@@ -64,9 +64,10 @@ Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job) {
     SplatCloud cloud;
     STX_CHECK(cloud.resize(count, degree, job.limits));
     cloud.up = {0, -1, 0};
-    std::vector<std::size_t> at;
+    std::vector<std::size_t> at, atRest;
+    at.reserve(std::size(kNeeded));
+    atRest.reserve(static_cast<std::size_t>(rest));
     for (const char* name : kNeeded) at.push_back(places.find(name)->second);
-    std::vector<std::size_t> atRest;
     for (int k = 0; k < rest; ++k)
         atRest.push_back(places.find(fmt::format("f_rest_{}", k))->second);
     const int coefficients = SplatCloud::coefficientCount(degree);

@@ -263,9 +263,12 @@ Result<void> writeSplats(const std::filesystem::path& path, SplatCloud cloud,
     Result<Bytes> bytes =
         fail(ErrorCode::usage, "splats are written as .ply, .spz or .glb, not as '{}'",
              path.filename().string());
-    if (ending == ".ply") bytes = encodePly(std::move(cloud));
-    if (ending == ".spz") bytes = encodeSpz(cloud, job);
-    if (ending == ".glb") bytes = encodeGlb(cloud);
+    if (ending == ".ply")
+        bytes = encodePly(std::move(cloud));
+    else if (ending == ".spz")
+        bytes = encodeSpz(cloud, job);
+    else if (ending == ".glb")
+        bytes = encodeGlb(cloud);
     if (!bytes) return propagate(bytes);
     return writeFile(path, *bytes, options);
 }

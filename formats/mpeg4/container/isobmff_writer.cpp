@@ -33,7 +33,7 @@ class Writer {
     Result<void> writeStream(const ElementaryStream& stream, const Sink& sink) {
         ElementaryStream alone = stream;
         alone.esId = 1;
-        STX_TRY(Track track, makeMediaTrack(alone, 0));
+        STX_TRY(WrittenTrack track, makeMediaTrack(alone, 0));
         tracks_.push_back(std::move(track));
         return writeTracks(sink, nullptr);
     }
@@ -52,7 +52,7 @@ class Writer {
             STX_CHECK(writeMovieHead(head, tracks_, iod, true));
         }
         // The size does not depend on the offsets, so they are known now.
-        for (Track& track : tracks_) track.offset += head.size() + mdatHeader;
+        for (WrittenTrack& track : tracks_) track.offset += head.size() + mdatHeader;
         head = ByteWriter();
         STX_CHECK(writeMovieHead(head, tracks_, iod, wide));
 
@@ -72,13 +72,13 @@ class Writer {
 
     Result<void> makeTracks() {
         STX_CHECK(collectStreams());
-        STX_TRY(Track scene, makeSceneTrack());
+        STX_TRY(WrittenTrack scene, makeSceneTrack());
         tracks_.push_back(std::move(scene));
         if (!document_.odFrames.empty()) {
-            STX_TRY(Track od, makeOdTrack());
+            STX_TRY(WrittenTrack od, makeOdTrack());
             tracks_.push_back(std::move(od));
         }
-        for (Track& media : media_) tracks_.push_back(std::move(media));
+        for (WrittenTrack& media : media_) tracks_.push_back(std::move(media));
         return {};
     }
 
@@ -132,7 +132,7 @@ class Writer {
             media_.push_back(std::move(*track));
         });
         // Files name the clock's track beside the descriptor, not in it.
-        for (Track& track : media_) {
+        for (WrittenTrack& track : media_) {
             const auto clock =
                 track.stream.ocrEsId ? trackOfEs_.find(*track.stream.ocrEsId) : trackOfEs_.end();
             if (clock == trackOfEs_.end()) continue;
@@ -142,9 +142,9 @@ class Writer {
         return done;
     }
 
-    Result<Track> makeMediaTrack(const ElementaryStream& stream, int odId) {
+    Result<WrittenTrack> makeMediaTrack(const ElementaryStream& stream, int odId) {
         const std::string what = fmt::format("the stream of object descriptor {}", odId);
-        Track track;
+        WrittenTrack track;
         const bool clashes = stream.esId == sceneId_ || stream.esId == odId_;
         track.id = stream.esId == 0 || clashes ? freeId() : stream.esId;
         track.stream = stream;
@@ -190,7 +190,7 @@ class Writer {
     }
 
     /// Sizes, rates and duration of a track whose samples are known.
-    static Result<void> finish(Track& track, const std::string& what) {
+    static Result<void> finish(WrittenTrack& track, const std::string& what) {
         ElementaryStream& stream = track.stream;
         if (stream.timescale == 0) return fail(ErrorCode::invalidInput, "{} has timescale 0", what);
         std::uint64_t largest = 0;
@@ -245,12 +245,12 @@ class Writer {
         return Bytes(bytes.begin(), bytes.end());
     }
 
-    Result<Track> makeSceneTrack() {
+    Result<WrittenTrack> makeSceneTrack() {
         const NodeIds ids = assignNodeIds(document_.frames);
         const BifsConfig config = fitBifsConfig(document_.bifsConfig, ids);
         if (document_.frames.empty())
             return fail(ErrorCode::invalidInput, "the document has no scene");
-        Track track;
+        WrittenTrack track;
         track.id = sceneId_;
         track.stream = document_.sceneStream;
         track.stream.samples.clear();
@@ -273,8 +273,8 @@ class Writer {
         return track;
     }
 
-    Result<Track> makeOdTrack() {
-        Track track;
+    Result<WrittenTrack> makeOdTrack() {
+        WrittenTrack track;
         track.id = odId_;
         track.stream = document_.odStream;
         track.stream.samples.clear();
@@ -286,7 +286,7 @@ class Writer {
         track.handler = "odsm";
         track.handlerName = "MPEG-4 object descriptors";
         std::unordered_map<std::uint32_t, std::uint32_t> places;
-        for (const Track& media : media_) {
+        for (const WrittenTrack& media : media_) {
             track.mpod.push_back(media.id);
             places[media.id] = static_cast<std::uint32_t>(track.mpod.size());
         }
@@ -337,7 +337,7 @@ class Writer {
     }
 
     template <class Frame>
-    static void addFrame(Track& track, Bytes bytes, const Frame& frame) {
+    static void addFrame(WrittenTrack& track, Bytes bytes, const Frame& frame) {
         Sample sample;
         sample.data = ByteRange::of(std::move(bytes));
         sample.time = frame.time;
@@ -351,7 +351,7 @@ class Writer {
     /// Gives each track its place in mdat; returns the bytes of all.
     std::uint64_t placeSamples() {
         std::uint64_t at = 0;
-        for (Track& track : tracks_) {
+        for (WrittenTrack& track : tracks_) {
             track.offset = at;
             at += track.bytes;
         }
@@ -360,7 +360,7 @@ class Writer {
 
     Result<void> writeSamples(const Sink& sink) {
         Bytes block;
-        for (const Track& track : tracks_)
+        for (const WrittenTrack& track : tracks_)
             for (const Sample& sample : track.stream.samples) {
                 STX_CHECK(job_.checkCancelled());
                 const ByteRange& range = sample.data;
@@ -384,8 +384,8 @@ class Writer {
     const Document& document_;
     Job& job_;
     Mp4WriteOptions options_;
-    std::vector<Track> tracks_;
-    std::vector<Track> media_;
+    std::vector<WrittenTrack> tracks_;
+    std::vector<WrittenTrack> media_;
     std::unordered_set<std::uint32_t> takenIds_;
     std::uint32_t nextFree_ = 1;
     std::uint32_t sceneId_ = 0;

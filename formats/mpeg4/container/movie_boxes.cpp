@@ -47,7 +47,7 @@ class BoxScope {
     std::size_t start_;
 };
 
-bool isSystems(const Track& track) {
+bool isSystems(const WrittenTrack& track) {
     return track.stream.streamType != StreamType::visual;
 }
 
@@ -57,7 +57,7 @@ std::uint64_t rescaled(std::uint64_t ticks, std::uint32_t from, std::uint32_t to
 }
 
 /// The edit list that a track gets: its own, or one that delays it.
-EditList editsOf(const Track& track, std::uint32_t timescale) {
+EditList editsOf(const WrittenTrack& track, std::uint32_t timescale) {
     EditList list{timescale, {}};
     const ElementaryStream& stream = track.stream;
     if (track.start > 0)
@@ -71,21 +71,21 @@ EditList editsOf(const Track& track, std::uint32_t timescale) {
     return list;
 }
 
-std::uint64_t movieDuration(const Track& track, std::uint32_t timescale) {
+std::uint64_t movieDuration(const WrittenTrack& track, std::uint32_t timescale) {
     std::uint64_t duration = 0;
     for (const Edit& edit : editsOf(track, timescale).edits) duration += edit.duration;
     return duration > 0 ? duration : rescaled(track.duration, track.stream.timescale, timescale);
 }
 
 /// A timescale in which every delay and every edit is a whole number, as far as one is fine enough.
-std::uint32_t movieTimescale(std::span<const Track> tracks) {
+std::uint32_t movieTimescale(std::span<const WrittenTrack> tracks) {
     std::uint64_t timescale = kMovieTimescale;
     const auto include = [&](std::uint64_t ticks, std::uint64_t each) {
         if (ticks == 0 || each == 0) return;
         const std::uint64_t finer = std::lcm(timescale, each / std::gcd(ticks, each));
         if (finer <= kFinestTimescale) timescale = finer;
     };
-    for (const Track& track : tracks) {
+    for (const WrittenTrack& track : tracks) {
         include(track.start, track.stream.timescale);
         for (const Edit& edit : track.stream.edits.edits)
             include(edit.duration, track.stream.edits.timescale);
@@ -152,7 +152,7 @@ void writeMovieHeader(ByteWriter& out, std::uint32_t timescale, std::uint64_t du
     out.u32(highestId == std::numeric_limits<std::uint32_t>::max() ? highestId : highestId + 1);
 }
 
-Result<void> writeSampleEntry(ByteWriter& out, const Track& track) {
+Result<void> writeSampleEntry(ByteWriter& out, const WrittenTrack& track) {
     if (!track.stream.sampleEntry.empty()) {
         const BoxScope stsd(out, "stsd", 0, 0);
         out.u32(1);
@@ -204,7 +204,7 @@ void writeRuns(ByteWriter& out, const std::vector<std::uint32_t>& values) {
     }
 }
 
-void writeTables(ByteWriter& out, const Track& track, bool wide) {
+void writeTables(ByteWriter& out, const WrittenTrack& track, bool wide) {
     const std::vector<Sample>& samples = track.stream.samples;
     const auto count = static_cast<std::uint32_t>(samples.size());
     std::vector<std::uint32_t> deltas;
@@ -262,7 +262,8 @@ void writeTables(ByteWriter& out, const Track& track, bool wide) {
         out.u32(static_cast<std::uint32_t>(track.offset));
 }
 
-Result<void> writeTrack(ByteWriter& out, const Track& track, std::uint32_t timescale, bool wide) {
+Result<void> writeTrack(ByteWriter& out, const WrittenTrack& track, std::uint32_t timescale,
+                        bool wide) {
     const BoxScope trak(out, "trak");
     {
         const std::uint64_t duration = movieDuration(track, timescale);
@@ -326,7 +327,7 @@ Result<void> writeTrack(ByteWriter& out, const Track& track, std::uint32_t times
 
 }  // namespace
 
-Result<void> writeMovieHead(ByteWriter& out, std::span<const Track> tracks,
+Result<void> writeMovieHead(ByteWriter& out, std::span<const WrittenTrack> tracks,
                             const InitialObjectDescriptor* iod, bool wide) {
     const std::uint32_t timescale = movieTimescale(tracks);
     {
@@ -338,7 +339,7 @@ Result<void> writeMovieHead(ByteWriter& out, std::span<const Track> tracks,
     const BoxScope moov(out, "moov");
     std::uint64_t duration = 0;
     std::uint32_t highest = 0;
-    for (const Track& track : tracks) {
+    for (const WrittenTrack& track : tracks) {
         duration = std::max(duration, movieDuration(track, timescale));
         highest = std::max(highest, track.id);
     }
@@ -346,12 +347,12 @@ Result<void> writeMovieHead(ByteWriter& out, std::span<const Track> tracks,
     if (iod != nullptr) {
         const BoxScope iods(out, "iods", 0, 0);
         std::vector<std::uint32_t> initial;
-        for (const Track& track : tracks)
+        for (const WrittenTrack& track : tracks)
             if (track.handler == "sdsm" || track.handler == "odsm") initial.push_back(track.id);
         STX_TRY(const Bytes descriptor, encodeIod(*iod, initial));
         out.bytes(descriptor);
     }
-    for (const Track& track : tracks) STX_CHECK(writeTrack(out, track, timescale, wide));
+    for (const WrittenTrack& track : tracks) STX_CHECK(writeTrack(out, track, timescale, wide));
     return {};
 }
 

@@ -11,7 +11,7 @@
 namespace stx::mpeg4 {
 
 /// A track to write: its descriptor, its samples, what it is called.
-struct Track {
+struct WrittenTrack {
     std::uint32_t id = 0;
     ElementaryStream stream;
     std::string handler;
@@ -28,7 +28,7 @@ struct Track {
 /// of 64 bits. Their size does not depend on the offsets. SOURCE_DATE_EPOCH, when set, is the time
 /// of creation. Errors: descriptors that cannot be coded.
 /// Without `iod` there is no `iods` box.
-[[nodiscard]] Result<void> writeMovieHead(ByteWriter& out, std::span<const Track> tracks,
+[[nodiscard]] Result<void> writeMovieHead(ByteWriter& out, std::span<const WrittenTrack> tracks,
                                           const InitialObjectDescriptor* iod, bool wide);
 
 }  // namespace stx::mpeg4

@@ -107,7 +107,7 @@ Footprint::Footprint(const PageSet& set) {
 double Footprint::samplesPerPixel(const Camera& camera) const {
     const glm::dmat4 cameraFromWorld = camera.cameraFromWorld();
     std::vector<double> ratios;
-    for (const Point& p : points_) {
+    for (const SampledPoint& p : points_) {
         const glm::dvec3 at(cameraFromWorld * glm::dvec4(p.world, 1.0));
         const double dist = -at.z;
         if (!(dist > 0)) continue;

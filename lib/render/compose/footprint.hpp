@@ -18,11 +18,11 @@ class Footprint {
     [[nodiscard]] int factor(const Camera& camera) const;
 
   private:
-    struct Point {
+    struct SampledPoint {
         glm::dvec3 world;
         double spacing;  ///< of the samples there, scene units
     };
-    std::vector<Point> points_;
+    std::vector<SampledPoint> points_;
 };
 
 /// The picture of a camera out of one that is `factor` times as wide and high: colours, albedo and

@@ -18,7 +18,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// Points this far beside a pixel's centre, along the outline, tell where it runs; pixels. Chosen
 /// by trial on the project's image sets and meshes.
 constexpr float kBeside = 0.6f;
-/// And so far to the left or right.
+/// Points this far to the left or right of it tell, pixels.
 constexpr float kAside = 1.5f;
 
 /// Adds a point to four pixels of a row, from `first` on; it lies (dx, dy) from the first one's
@@ -39,7 +39,7 @@ HWY_INLINE void addToRow(const OutlineRows& rows, std::size_t first, float dx, f
         const auto y = hn::Set(d, dy);
         const auto along = hn::MulAdd(nx, x, hn::Mul(ny, y));
         const auto aside = hn::Abs(hn::NegMulAdd(ny, x, hn::Mul(nx, y)));
-        // False where nothing is asked for.
+        // Whether some pixel around is asked for.
         const auto in =
             hn::And(hn::Le(aside, hn::Set(d, kBeside)), hn::Le(hn::Abs(x), hn::Set(d, kAside)));
         hn::StoreU(hn::IfThenElse(in, hn::Max(high, along), high), d, rows.high + first + k);
@@ -82,7 +82,7 @@ void addPointsImpl(const OutlineBlock& block, const OutlineDepths& depths, const
             const auto w = orthographic ? set(1.0f) : hn::Div(set(1.0f), along);
             const auto x = hn::Sub(hn::Mul(h(0), w), set(static_cast<float>(rows.left)));
             const auto y = hn::Sub(hn::Mul(h(1), w), set(static_cast<float>(rows.top)));
-            // False for what is not a number.
+            // Comparisons with NaN are false.
             const auto inside =
                 hn::And(hn::And(hn::Gt(along, hn::Zero(d)),
                                 hn::And(hn::Ge(x, set(-0.5f)), hn::Lt(x, set(width - 0.5f)))),

@@ -19,7 +19,7 @@ constexpr int kBandRows = 64;
 constexpr int kTile = 4;
 /// Pixels on each side that tell which way an outline runs.
 constexpr int kAround = 2;
-/// So many of them must be there.
+/// The fewest pixels that tell a direction.
 constexpr float kEnoughPoints = 12.0f;
 /// So many views are asked in a frame. The outermost of the points of more lie beyond the outline,
 /// by what their pixels cover in part. Sides are those of the outline.

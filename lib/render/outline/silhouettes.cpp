@@ -59,9 +59,9 @@ void overReach(std::span<const std::uint8_t> row, std::span<std::uint8_t> to, co
             joined(joined(joined(row[x - 2], row[x - 1]), joined(row[x], row[x + 1])), row[x + 2]);
 }
 
-/// 1 where one of the `count` pixels of a row lies within kReach of an empty one, in the row.
-/// `empty` holds kReach elements more on either side, which are 0. Without branches, so that
-/// compilers make vectors of it.
+/// Sets 1 where an empty pixel lies within kReach in the same row, of `count` pixels. `empty` holds
+/// kReach elements more on either side, which are 0. Without branches, so that compilers make
+/// vectors of it.
 void markRow(const float* depth, int count, std::uint8_t* empty, std::uint8_t* near) {
     for (int x = 0; x < count; ++x) empty[kReach + x] = hasPoint(depth[x]) ? 0 : 1;
     static_assert(kReach == 2);

@@ -21,7 +21,7 @@ class Silhouettes {
     /// Views whose alpha is full everywhere (full scenes) have no vote and cost nothing.
     explicit Silhouettes(PageSet set);
 
-    /// Nothing to do for these views.
+    /// Whether there is nothing to do for these views.
     [[nodiscard]] bool none() const { return !outlines_; }
     /// Sets alpha, premultiplied colour and albedo of the pixels within two pixels of the
     /// background; what is left with no coverage gets empty. All that was drawn lies in `drawn`.
@@ -50,7 +50,7 @@ class Silhouettes {
     PageSet set_;
     std::optional<Outlines> outlines_;  ///< where some view has a vote
     std::vector<View> views_;
-    /// Of the frame that is carved; between frames -1 all over.
+    /// Depths of the frame that is carved; -1 everywhere between two frames.
     Image<float> covered_;
 };
 

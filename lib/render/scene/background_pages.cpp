@@ -7,11 +7,11 @@
 namespace stx {
 namespace {
 
-/// Points at which light is compared.
+/// The number of points at which light is compared.
 constexpr double kLightPoints = 20000;
 /// The same surface: depths that differ by no more than this share.
 constexpr float kSameDepth = 0.01f;
-/// A gain that moves no 8-bit value is none.
+/// A gain nearer to 1 than this moves no 8-bit value and counts as none.
 constexpr float kNoGain = 0.5f / 255;
 
 /// Colours of two views of one camera, where both show the same surface.

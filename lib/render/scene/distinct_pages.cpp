@@ -6,7 +6,7 @@
 namespace stx {
 namespace {
 
-/// Pixels of a view that are compared, about.
+/// The number of pixels of a view that are compared, about.
 constexpr double kComparedPixels = 20000;
 /// Colours (0..1) and depths (a share) that are apart by no more are the same: steps of 8 bits, and
 /// what rounding makes of poses that are the same up to it.

@@ -23,7 +23,7 @@ Camera windowOf(const Camera& view, const AtlasRectangle& r) {
         c.cy = view.cy - r.viewY;
         return c;
     }
-    // A quarter clockwise: the window's x runs up the view, its y to the view's right.
+    // Turned by a quarter clockwise: the window's x runs up the view, its y to the view's right.
     c.fx = view.fy;
     c.fy = view.fx;
     c.cx = r.height - (view.cy - r.viewY);

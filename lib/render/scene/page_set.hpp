@@ -91,7 +91,7 @@ class PageSet {
 
     [[nodiscard]] std::span<const Page> pages() const { return data_->pages; }
     [[nodiscard]] std::span<const PageView> views() const { return data_->views; }
-    /// In the order of their views.
+    /// The rectangles, in the order of their views.
     [[nodiscard]] std::span<const PageRectangle> rectangles() const { return data_->rectangles; }
     [[nodiscard]] std::span<const PageRectangle> rectanglesOf(std::size_t view) const {
         const PageView& v = data_->views[view];
@@ -108,7 +108,7 @@ class PageSet {
     [[nodiscard]] bool linear() const;
     [[nodiscard]] bool pruned() const { return data_->pruned; }
     [[nodiscard]] std::int64_t pointCount() const;
-    /// Of all views.
+    /// The pixels of all views together.
     [[nodiscard]] std::uint64_t pixelCount() const;
     /// The same with translucent surfaces made opaque, for renderers to whom alpha says how much of
     /// a pixel the object covers at its outline: points with translucent points all around them,
@@ -142,8 +142,8 @@ class PageSet {
     /// where `captured`, these views before they were refined, has no such pixels; `pixels` tells
     /// how many.
     [[nodiscard]] PageSet withUnmeasured(const PageSet& captured, std::int64_t& pixels) const;
-    /// Of what withUnmeasured() put behind: what is farther than half of that is far away, where
-    /// nobody knows. 0 of other sets.
+    /// Scene units: points of withUnmeasured() farther than half of this are "far away", since
+    /// nobody knows where they are. 0 for other sets.
     [[nodiscard]] double farAway() const { return data_->farAway; }
     /// Whether depth is as exact as its codes: no noise, nothing that reached over its edges.
     [[nodiscard]] bool exactDepth() const;
@@ -151,7 +151,7 @@ class PageSet {
     [[nodiscard]] const Texture& captured(std::size_t page) const {
         return data_->captured.empty() ? *pages()[page].texture : *data_->captured[page];
     }
-    /// What is drawn where nothing else is: background views. Null when there are none.
+    /// The background views, which are drawn where nothing else is. Null when there are none.
     [[nodiscard]] const PageSet* behind() const { return behind_.get(); }
     /// The same views in front of a background.
     [[nodiscard]] PageSet before(PageSet background) const {
@@ -194,7 +194,8 @@ class PageSet {
         return bits[i / 64] >> (i % 64) & 1;
     }
 
-    /// Those marks of a whole view, a bit for each pixel, row by row; empty when none is set.
+    /// The marks of objectOutside() of a whole view, a bit for each pixel, row by row; empty when
+    /// none is set.
     [[nodiscard]] std::span<const std::uint64_t> outside(std::size_t view) const {
         return data_->index[view].outside;
     }
@@ -220,7 +221,7 @@ class PageSet {
     [[nodiscard]] ReferenceView copyOfView(std::size_t view) const;
 
   private:
-    /// Where a view's rectangles are, by blocks of kBlock pixels.
+    /// The rectangles of a view that lie in each of its blocks of kBlock pixels.
     struct ViewIndex {
         std::uint32_t blocksX = 0;
         std::vector<std::uint32_t> begin;    ///< of each block in `near`, and the end
@@ -238,7 +239,7 @@ class PageSet {
         bool pruned = false;
         PixelSpool* spool = nullptr;
         std::shared_ptr<const Bundle> unpacked;  ///< of an atlas without room around rectangles
-        /// Of solid(), inLightOf() and inOneLight().
+        /// The copies of textures that solid(), inLightOf() and inOneLight() made.
         std::vector<std::shared_ptr<const Texture>> changed;
         std::vector<const Texture*> captured;  ///< by page; empty: those of the pages
         std::vector<std::shared_ptr<const Image<float>>> refined;  ///< depth of refined()

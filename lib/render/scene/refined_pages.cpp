@@ -45,7 +45,7 @@ bool PageSet::mayRefine(const RefineSettings& settings) const {
         ReferenceView copy;
         ofViews[i].add(viewImages(*this, i, copy));
     };
-    // Copies of views in rectangles take memory.
+    // Views in rectangles are copied; one at a time, since a copy takes the memory of a whole view.
     if (views().front().whole)
         parallelFor(0, static_cast<std::int64_t>(ofViews.size()),
                     [&](std::int64_t i) { look(static_cast<std::size_t>(i)); });

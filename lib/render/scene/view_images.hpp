@@ -5,7 +5,7 @@
 
 namespace stx {
 
-/// A view of a set as lib/refine takes it. Of one in rectangles `copy` keeps the images.
+/// The images of a view as lib/refine takes them. A view in rectangles is copied to `copy`.
 [[nodiscard]] RefineView viewImages(const PageSet& set, std::size_t number, ReferenceView& copy);
 
 /// Puts the depth of a view where a rectangle of it is on a page, padding included.

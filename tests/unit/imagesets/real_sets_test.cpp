@@ -189,6 +189,38 @@ TEST(IclNuim, NeighboursAreDrawnBetterThanByTheNaiveWarp) {
     }
 }
 
+// Rows of rectified pictures lie a tenth of a pixel beside each other, and disparities are too
+// small.
+TEST(OlderMiddlebury, PairsThatLieBesideEachOtherAreAligned) {
+    struct Set {
+        const char* name;
+        double scale, better;
+    };
+    for (const Set& of : {Set{"2005-books", 3, 0.7}, Set{"2005-dolls", 3, 0.45},
+                          Set{"2005-laundry", 3, 0.85}, Set{"2003-cones", 4, 0.03}}) {
+        REQUIRE_SHARED(set, fmt::format("data/imagesets/middlebury{}", of.name));
+        ImageSetOptions options;
+        options.focal = 1000;
+        options.baseline = 160;
+        options.disparityScale = of.scale;
+        ImageSetOptions without = options;
+        without.refine.set(RefineStep::shift, false);
+        Job job;
+        const auto aligned = readImageSet(set, options, job);
+        const auto asStored = readImageSet(set, without, job);
+        ASSERT_TRUE(aligned && asStored);
+        EXPECT_NE(aligned->views[1].camera.cy, asStored->views[1].camera.cy);
+        EXPECT_EQ(aligned->views[0].camera.cy, asStored->views[0].camera.cy);
+        const Rgba8Image truth = *asStored->views[1].texture.rgba8();
+        const auto psnrOf = [&](const Bundle& b) {
+            return warp(asStored->views[0], b.views[0], b.views[1].camera, truth).psnr;
+        };
+        const double now = psnrOf(*aligned), before = psnrOf(*asStored);
+        std::printf("  %s: %.2f dB, as stored %.2f dB\n", of.name, now, before);
+        EXPECT_GE(now, before + of.better) << of.name;
+    }
+}
+
 TEST(MiddleburyAloe, NeighboursAreDrawnBetterThanByTheNaiveWarp) {
     REQUIRE_SHARED(set, "data/imagesets/middlebury2006-aloe");
     const auto kind = recogniseImageSet(set);

@@ -1,5 +1,6 @@
 #include "lib/refine/noise.hpp"
 
+#include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -129,6 +130,28 @@ TEST(DepthNoise, PointsOfSteepSurfacesAreNoStraysAndThoseThatNoOtherViewKnowsSta
         for (int x = 1; x + 1 < kNoisySide; ++x) removed += !(q.at(x, y) > 0.0f);
     EXPECT_LT(q.at(stray, stray), 0.0f);
     EXPECT_LE(removed, 9);
+}
+
+// The sweep found balls in splat mode that lost their outermost points, since another view shows
+// them, too.
+TEST(DepthNoise, PointsOfRimsThatOtherViewsShowAreNoStrays) {
+    constexpr int kBallSide = 64;
+    Camera camera;
+    camera.width = camera.height = kBallSide;
+    camera.fx = camera.fy = kBallSide;
+    const PixelSpace space(camera, 0.0);
+    std::array<Image<float>, 2> balls{ballOf(kBallSide, 0), ballOf(kBallSide, 0)};
+    std::vector<NoisyView> views(2);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        views[i].space = &space;
+        views[i].q = &balls[i];
+        views[i].surface = Image<glm::vec3>(kBallSide, kBallSide, glm::vec3(0, 0, 1e-5f));
+    }
+    EXPECT_EQ(removeStrays(views), 0);
+    // In front of clear background it is one.
+    balls[0].at(1, 1) = 0.3f;
+    EXPECT_EQ(removeStrays(views), 1);
+    EXPECT_LT(balls[0].at(1, 1), 0.0f);
 }
 
 TEST(DepthNoise, ExactDepthStaysAsItIs) {

@@ -94,7 +94,7 @@ class CpuSplatRenderer final : public Renderer {
 
     Frame spare_;  // memory for the next frame
 
-    // Of the frame being drawn.
+    // The members below belong to the frame that is being drawn.
     std::vector<RectangleImages> sources_;
     std::vector<BlockTask> tasks_;
     std::vector<std::uint8_t> seen_;

@@ -111,7 +111,7 @@ HWY_INLINE void addRowOfPoints(const RectangleImages& s, std::size_t pixel, std:
     group(std::integral_constant<int, 3>());
 }
 
-// The same of their normals, which are the same all over a splat.
+// The same for their normals; a splat has one normal.
 HWY_INLINE void addNormalsOfRow(const RectangleImages& s, std::size_t pixel, std::uint32_t bits,
                                 const RowOfPoints& r, const Region& region) {
     const DF d;

@@ -73,7 +73,7 @@ HWY_INLINE unsigned halvesOf(const BlockTask& t, int row) {
     return (row < kBlock / 2 ? t.quarters : t.quarters >> 2) & 3u;
 }
 
-// The lanes of those halves, from pixel `i` of the row on.
+// The lanes that lie in those halves, from pixel `i` of the row on.
 HWY_INLINE hn::Mask<DF> lanesOf(DF d, unsigned halves, int i) {
     const VF index = hn::Add(hn::Iota(d, 0), hn::Set(d, static_cast<float>(i)));
     constexpr float kHalf = kBlock / 2;
@@ -145,7 +145,8 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
     const auto fits = hn::Lt(cover2, hn::Set(d, kSmallCover2));
     out.small = hn::And(hn::And(seen, fits), out.at.inside);
     out.large = hn::AndNot(fits, seen);
-    // At its rim the surface ends within half a sample; beside any edge colours are mixed.
+    // At the rim of an object the surface ends within half a sample; beside any edge colours are
+    // mixed.
     out.core2 = hn::Mul(hn::Max(hn::Set(d, 0.5f), hn::Mul(cover2, hn::Set(d, 1.08f))),
                         hn::IfThenElse(rim, hn::Set(d, kRimCore2), one));
     const VF limit = hn::Set(d, kSteepestPlane);
@@ -180,7 +181,7 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
         out.qxx = hn::Mul(vyy, scale);
         out.qyy = hn::Mul(vxx, scale);
         out.qxy = hn::Neg(hn::Mul(vxy, scale));
-        // In the first pass only what hides is drawn.
+        // The first pass draws only the core of a splat, which hides what is behind.
         const VF reach = hn::Set(d, kColour ? kDrawn2 : kCore2), largest = hn::Set(d, kLargest);
         out.halfX = hn::Min(hn::Sqrt(hn::Mul(reach, vxx)), largest);
         out.halfY = hn::Min(hn::Sqrt(hn::Mul(reach, vyy)), largest);

@@ -75,7 +75,7 @@ void groupPoints(const PointArrays& points, const RenderSettings& settings, cons
     const float offset =
         static_cast<float>(glm::dot(points.centre - camera.position, camera.forward()));
     const auto focal = static_cast<float>(std::max(camera.fx, camera.fy));
-    // Just closes the diagonal of the lattice.
+    // A splat of this size just closes the diagonal of the lattice of points.
     const float closing = std::sqrt(2.0f) * focal;
     const std::size_t count = points.positions.size();
     std::vector<std::uint8_t> sizes(count);

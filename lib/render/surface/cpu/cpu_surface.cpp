@@ -14,37 +14,7 @@ namespace stx {
 namespace surface {
 namespace {
 
-class CpuSurfaceBackend final : public SurfaceBackend {
-  public:
-    explicit CpuSurfaceBackend(Job& job) : job_(job) {}
-
-    Result<void> prepare(const SurfaceScene&, const Effort&, Job&) override { return {}; }
-    Result<void> begin(const SurfaceFrame& frame) override {
-        frame_ = &frame;
-        return {};
-    }
-    Result<void> finish(DrawnFrame out) override {
-        parallelFor(0, static_cast<std::int64_t>(frame_->tilesX) * frame_->tilesY,
-                    [&](std::int64_t tile) {
-                        if (job_.cancelled || frame_->sources.empty()) return;
-                        drawTile(*frame_, static_cast<int>(tile), out);
-                        frame_->sources.front().source->set->settle();
-                    });
-        return {};
-    }
-    void drop() override {}
-    bool drawsAhead() const override { return false; }
-    std::string name() const override { return "cpu"; }
-    std::string device() const override { return cpuDeviceName(); }
-
-  private:
-    static void drawTile(const SurfaceFrame& frame, int tile, DrawnFrame out);
-
-    Job& job_;
-    const SurfaceFrame* frame_ = nullptr;
-};
-
-/// The squares that those pixels and the pixels beside them are in.
+/// Which squares of the tile hold these pixels or a pixel beside them.
 Squares squaresOf(const TilePixels& pixels) {
     Squares squares = 0;
     for (std::size_t y = 0; y < kTile; ++y) {
@@ -59,100 +29,166 @@ Squares squaresOf(const TilePixels& pixels) {
     return squares;
 }
 
-void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame out) {
-    const std::vector<int>& chosen = frame.sourcesOf(tile);
-    if (std::all_of(chosen.begin(), chosen.end(), [&](int k) {
-            return frame.sources[static_cast<std::size_t>(k)].blocksOf(tile).empty();
-        }))
-        return;
-    const PixelSpace& space = frame.space;
-    const int tileX = frame.tileX(tile), tileY = frame.tileY(tile);
-    const int columns = std::min(kTile, out.q.width() - tileX);
-    const int rows = std::min(kTile, out.q.height() - tileY);
-    const int perPixel = frame.effort.samplesPerPixel;
-    const SampleGrid grid{perPixel};
-    static thread_local std::vector<float> samples;
-    static thread_local Pieces pieces;
-    static thread_local std::vector<glm::vec3> colours;
-    static thread_local std::vector<std::int8_t> best;
-    static thread_local std::vector<LocalSource> local;
-    static thread_local std::vector<ShadeSource> shade;
-    const std::size_t room = std::max(grid.count(), kMiddles.count());
-    samples.resize(std::max(samples.size(), room * chosen.size()));
-    local.clear();
-    shade.clear();
-    for (const int k : chosen) {
-        const FrameSource& f = frame.sources[static_cast<std::size_t>(k)];
-        local.push_back({f.source, f.sourceFromPixel, nullptr, f.pixelFromSource});
-        shade.push_back({f.source, f.sourceFromPixel, f.fromEye});
+/// Draws tiles, one after another, in memory that is kept from one to the next.
+class TileDrawer {
+  public:
+    void draw(const SurfaceFrame& frame, int tile, DrawnFrame out) {
+        frame_ = &frame;
+        tile_ = tile;
+        chosen_ = &frame.sourcesOf(tile);
+        if (std::all_of(chosen_->begin(), chosen_->end(),
+                        [&](int k) { return sourceAt(k).blocksOf(tile).empty(); }))
+            return;
+        listSources();
+        listBlocks();
+        makePieces(out.q.width(), out.q.height());
+        shadePieces(pieces_, shade_, rayFrom(frame.space, frame.space), frame.effort.shade,
+                    colours_, best_);
+        addPiecesTo(out);
     }
-    // The blocks of each source that may show, one source after another, and where each is drawn.
-    static thread_local std::vector<std::uint32_t> facing;
-    static thread_local std::vector<std::size_t> facingEnd;
-    static thread_local std::vector<Squares> drawnIn;
-    facing.clear();
-    facingEnd.clear();
-    drawnIn.clear();
-    for (const int k : chosen) {
-        const FrameSource& f = frame.sources[static_cast<std::size_t>(k)];
-        for (const std::uint32_t block : f.blocksOf(tile))
-            if (!f.turnedAway[block]) facing.push_back(block);
-        facingEnd.push_back(facing.size());
+
+  private:
+    [[nodiscard]] const FrameSource& sourceAt(int k) const {
+        return frame_->sources[static_cast<std::size_t>(k)];
     }
-    const auto drawAll = [&](const SampleGrid& each, const RasterNeeds& needs) {
-        const glm::dmat4 sampleFromPixel = frame.sampleFromPixel(tile, each.perPixel, each.apron);
+    [[nodiscard]] SampleGrid grid() const { return {frame_->effort.samplesPerPixel}; }
+
+    void listSources() {
+        room_ = std::max(grid().count(), kMiddles.count());
+        samples_.resize(std::max(samples_.size(), room_ * chosen_->size()));
+        local_.clear();
+        shade_.clear();
+        for (const int k : *chosen_) {
+            const FrameSource& f = sourceAt(k);
+            local_.push_back({f.source, f.sourceFromPixel, nullptr, f.pixelFromSource});
+            shade_.push_back({f.source, f.sourceFromPixel, f.fromEye});
+        }
+    }
+
+    void listBlocks() {
+        facing_.clear();
+        facingEnd_.clear();
+        drawnIn_.clear();
+        for (const int k : *chosen_) {
+            const FrameSource& f = sourceAt(k);
+            for (const std::uint32_t block : f.blocksOf(tile_))
+                if (!f.turnedAway[block]) facing_.push_back(block);
+            facingEnd_.push_back(facing_.size());
+        }
+    }
+
+    /// Draws each source into its samples.
+    void drawSources(const SampleGrid& each, const RasterNeeds& needs) {
+        const glm::dmat4 sampleFromPixel =
+            frame_->sampleFromPixel(tile_, each.perPixel, each.apron);
         std::size_t first = 0;
-        for (std::size_t k = 0; k < chosen.size(); ++k) {
-            const FrameSource& f = frame.sources[static_cast<std::size_t>(chosen[k])];
-            float* mine = samples.data() + room * k;
-            const std::span<const std::uint32_t> blocks{facing.data() + first,
-                                                        facingEnd[k] - first};
+        for (std::size_t k = 0; k < chosen_->size(); ++k) {
+            const FrameSource& f = sourceAt((*chosen_)[k]);
+            float* mine = samples_.data() + room_ * k;
+            const std::span<const std::uint32_t> blocks{facing_.data() + first,
+                                                        facingEnd_[k] - first};
             if (blocks.empty()) continue;
             RasterNeeds own = needs;
             if (each.apron > 0) {
-                drawnIn.resize(facingEnd[k]);
-                own.drawnIn = {drawnIn.data() + first, blocks.size()};
-            } else if (!drawnIn.empty()) {
-                own.of = {drawnIn.data() + first, blocks.size()};
+                drawnIn_.resize(facingEnd_[k]);
+                own.drawnIn = {drawnIn_.data() + first, blocks.size()};
+            } else if (!drawnIn_.empty()) {
+                own.of = {drawnIn_.data() + first, blocks.size()};
             }
-            first = facingEnd[k];
+            first = facingEnd_[k];
             const bool drawn =
                 rasteriseSource(*f.source, warpFrom(sampleFromPixel * f.pixelFromSource), blocks,
-                                each, space.axis, mine, own);
-            local[k].samples = drawn ? mine : nullptr;
+                                each, frame_->space.axis, mine, own);
+            local_[k].samples = drawn ? mine : nullptr;
         }
-    };
-    pieces.clear();
-    const int core = frame.tileCore[static_cast<std::size_t>(tile)];
-    if (!frame.effort.settle) {
-        drawAll(grid, {});
-        fuseTile(local, grid, space.axis, tileX, tileY, columns, rows, pieces, nullptr, core);
-    } else {
-        // First one sample for each pixel; all of them only where that does not tell.
-        drawAll(kMiddles, {kAllSquares, true, {}, {}});
-        const TilePixels open =
-            fuseSettled(local, space.axis, tileX, tileY, columns, rows, perPixel, pieces);
+    }
+
+    /// Finds the surfaces that each pixel shows. The frame has this size, pixels.
+    void makePieces(int width, int height) {
+        pieces_.clear();
+        const DepthAxis& axis = frame_->space.axis;
+        const int tileX = frame_->tileX(tile_), tileY = frame_->tileY(tile_);
+        const int columns = std::min(kTile, width - tileX), rows = std::min(kTile, height - tileY);
+        const int core = frame_->tileCore[static_cast<std::size_t>(tile_)];
+        if (!frame_->effort.settle) {
+            drawSources(grid(), {});
+            fuseTile(local_, grid(), axis, tileX, tileY, columns, rows, pieces_, nullptr, core);
+            return;
+        }
+        // One sample for each pixel is drawn first; where it does not settle the pixel, all of
+        // them.
+        drawSources(kMiddles, {kAllSquares, true, {}, {}});
+        const TilePixels open = fuseSettled(local_, axis, tileX, tileY, columns, rows,
+                                            frame_->effort.samplesPerPixel, pieces_);
         if (const Squares squares = squaresOf(open)) {
-            drawAll(grid, {squares, false, {}, {}});
-            fuseTile(local, grid, space.axis, tileX, tileY, columns, rows, pieces, &open, core);
+            drawSources(grid(), {squares, false, {}, {}});
+            fuseTile(local_, grid(), axis, tileX, tileY, columns, rows, pieces_, &open, core);
         }
     }
-    shadePieces(pieces, shade, rayFrom(space, space), frame.effort.shade, colours, best);
-    std::array<float, kTile * kTile> mainShare{};
-    for (std::size_t i = 0; i < pieces.size(); ++i) {
-        const int x = tileX + pieces.pixel[i] % kTile, y = tileY + pieces.pixel[i] / kTile;
-        out.colour.at(x, y) += glm::vec4(colours[i], 1.0f) * pieces.share[i];
-        float& most = mainShare[pieces.pixel[i]];
-        if (!(pieces.share[i] > most)) continue;
-        most = pieces.share[i];
-        out.q.at(x, y) = pieces.q[i];
-        if (out.origin.empty() || best[i] < 0) continue;
-        const auto k = static_cast<std::size_t>(best[i]);
-        const glm::vec4 h =
-            local[k].sourceFromPixel.homogeneous(pieces.x[i], pieces.y[i], pieces.q[i]);
-        out.origin.at(x, y) = {static_cast<float>(chosen[k]), h.x / h.w, h.y / h.w};
+
+    /// Adds the colours of the pieces, each by its share of the pixel. The depth and the origin of
+    /// a pixel are those of its largest piece.
+    void addPiecesTo(DrawnFrame& out) const {
+        const int tileX = frame_->tileX(tile_), tileY = frame_->tileY(tile_);
+        std::array<float, kTile * kTile> mainShare{};
+        for (std::size_t i = 0; i < pieces_.size(); ++i) {
+            const int x = tileX + pieces_.pixel[i] % kTile, y = tileY + pieces_.pixel[i] / kTile;
+            out.colour.at(x, y) += glm::vec4(colours_[i], 1.0f) * pieces_.share[i];
+            float& most = mainShare[pieces_.pixel[i]];
+            if (!(pieces_.share[i] > most)) continue;
+            most = pieces_.share[i];
+            out.q.at(x, y) = pieces_.q[i];
+            if (out.origin.empty() || best_[i] < 0) continue;
+            const auto k = static_cast<std::size_t>(best_[i]);
+            const glm::vec4 h =
+                local_[k].sourceFromPixel.homogeneous(pieces_.x[i], pieces_.y[i], pieces_.q[i]);
+            out.origin.at(x, y) = {static_cast<float>((*chosen_)[k]), h.x / h.w, h.y / h.w};
+        }
     }
-}
+
+    const SurfaceFrame* frame_ = nullptr;
+    int tile_ = 0;
+    const std::vector<int>* chosen_ = nullptr;  ///< the tile's sources, the best first
+    std::size_t room_ = 0;                      ///< samples of a source
+    std::vector<float> samples_;
+    std::vector<LocalSource> local_;
+    std::vector<ShadeSource> shade_;
+    std::vector<std::uint32_t> facing_;   ///< blocks that may show, one source after another
+    std::vector<std::size_t> facingEnd_;  ///< of each source
+    std::vector<Squares> drawnIn_;        ///< where each block was drawn
+    Pieces pieces_;
+    std::vector<glm::vec3> colours_;  ///< of each piece
+    std::vector<std::int8_t> best_;   ///< the source that a piece shows most of, or -1
+};
+
+class CpuSurfaceBackend final : public SurfaceBackend {
+  public:
+    explicit CpuSurfaceBackend(Job& job) : job_(job) {}
+
+    Result<void> prepare(const SurfaceScene&, const Effort&, Job&) override { return {}; }
+    Result<void> begin(const SurfaceFrame& frame) override {
+        frame_ = &frame;
+        return {};
+    }
+    Result<void> finish(DrawnFrame out) override {
+        parallelFor(0, static_cast<std::int64_t>(frame_->tilesX) * frame_->tilesY,
+                    [&](std::int64_t tile) {
+                        if (job_.cancelled || frame_->sources.empty()) return;
+                        static thread_local TileDrawer drawer;
+                        drawer.draw(*frame_, static_cast<int>(tile), out);
+                        frame_->sources.front().source->set->settle();
+                    });
+        return {};
+    }
+    void drop() override {}
+    bool drawsAhead() const override { return false; }
+    std::string name() const override { return "cpu"; }
+    std::string device() const override { return cpuDeviceName(); }
+
+  private:
+    Job& job_;
+    const SurfaceFrame* frame_ = nullptr;
+};
 
 }  // namespace
 }  // namespace surface

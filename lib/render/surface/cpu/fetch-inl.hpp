@@ -24,16 +24,16 @@ struct alignas(64) ColourSum {
     float v[16];
 };
 
-/// The weights of the taps of all pieces of a group, as fetching wants them: the four of a row side
-/// by side.
+/// The weights of the taps of all pieces of a group; the four of a row lie side by side, as they
+/// are loaded.
 struct TapWeights {
-    /// v[row][l % 4] holds the row's taps of piece l from 4 (l / 4) on: what transposing blocks of
-    /// four pieces gives.
+    /// v[row][l % 4] holds taps 4 (l / 4) to 4 (l / 4) + 3 of a row of piece l: the order in which
+    /// blocks of four pieces come out of transposing.
     Lanes v[kTaps][4];
 
     [[nodiscard]] const float* row(int j, int lane) const { return &v[j][lane & 3][lane & ~3]; }
 
-    /// Keeps four taps of a row for the pieces l and following, a vector of each.
+    /// Stores four taps of a row of the pieces from l on; each vector holds one tap of all of them.
     template <class D, class V = hn::Vec<D>>
     HWY_INLINE void store(D d, int j, int l, const V* taps) {
 #if HWY_TARGET == HWY_SCALAR
@@ -67,7 +67,8 @@ HWY_NOINLINE void fetchFloats(const RgbaFloatImage& image, const TapPlace& taps,
     }
 }
 
-/// The same of 8-bit texels, `rows` of four: as many of a row at once as a vector takes.
+/// The same for 8-bit texels of `rows` rows of four taps; as many taps of a row at once as a vector
+/// takes.
 HWY_INLINE void fetchRows(const glm::u8vec4* texels, int stride, int rows,
                           const TapWeights& weights, int lane, ColourSum& sum) {
     const hn::CappedTag<float, 16> d;
@@ -97,7 +98,8 @@ HWY_INLINE void fetchRows(const glm::u8vec4* texels, int stride, int rows,
     }
 }
 
-/// The texels of taps that are not side by side or not all there, which count nothing.
+/// Collects the texels of taps that do not lie side by side; taps outside of the rectangle get
+/// zeros.
 HWY_NOINLINE void gatherTaps(const Rgba8Image& image, const TapPlace& taps, int baseU, int baseV,
                              glm::u8vec4* out) {
     for (int j = 0; j < kTaps; ++j) {

@@ -31,7 +31,7 @@ struct Taps {
     V xu, xv, yu, yv;
     V du[T], dv[T];
 
-    HWY_INLINE Taps(D d, const View& view, const Lanes& baseU, const Lanes& baseV, int l) {
+    HWY_INLINE Taps(D d, const GroupSource& view, const Lanes& baseU, const Lanes& baseV, int l) {
         const V half = hn::Set(d, 0.5f);
         du[0] = hn::Sub(hn::Add(hn::LoadU(d, &baseU[l]), half), hn::LoadU(d, &view.u[l]));
         dv[0] = hn::Sub(hn::Add(hn::LoadU(d, &baseV[l]), half), hn::LoadU(d, &view.v[l]));
@@ -45,7 +45,8 @@ struct Taps {
         yv = hn::LoadU(d, &view.yv[l]);
     }
 
-    /// xx x² + xy x y + yy y² as uu du² + uv du dv + vv dv².
+    /// Turns a quadratic form in x and y into one in du and dv: xx x² + xy x y + yy y² = uu du² +
+    /// uv du dv + vv dv².
     HWY_INLINE void quadratic(V xx, V xy, V yy, V& uu, V& uv, V& vv) const {
         const V alongU = hn::MulAdd(xx, xu, hn::Mul(xy, yu)), yyu = hn::Mul(yy, yu);
         const V alongV = hn::MulAdd(xx, xv, hn::Mul(xy, yv)), yyv = hn::Mul(yy, yv);
@@ -55,7 +56,8 @@ struct Taps {
         uv = hn::Add(uv, hn::MulAdd(alongV, xu, hn::Mul(yyv, yu)));
     }
 
-    /// The kernel: r² = uu du² + uv du dv + vv dv², 1 where it ends.
+    /// The kernel of the fit: r² = uu du² + uv du dv + vv dv² is the squared distance, 1 at the
+    /// radius where the kernel ends.
     HWY_INLINE void metric(D d, float inverseRadius, V& uu, V& uv, V& vv) const {
         // (1-h) I + h J Jt, inverted; see metricOf() in shaders/shared/surface_shade.glsl.
         const V one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
@@ -92,7 +94,7 @@ struct Taps {
             if (T == kTaps)
                 squareU[i] = hn::IfThenElse(beyond(du[i]), hn::Set(d, -1e9f), squareU[i]);
         }
-        // g[a][b]: of du^a dv^b.
+        // g[a][b] is the moment of du^a dv^b.
         V g00, g10, g20, g30, g40, g01, g11, g21, g31, g02, g12, g22, g03, g13, g04;
         g00 = g10 = g20 = g30 = g40 = g01 = g11 = g21 = g31 = hn::Zero(d);
         g02 = g12 = g22 = g03 = g13 = g04 = hn::Zero(d);
@@ -132,7 +134,7 @@ struct Taps {
             g13 = hn::MulAdd(s1, v3, g13);
             g04 = hn::MulAdd(s0, v4, g04);
         }
-        // From du and dv to x and y, one factor after another.
+        // Turns moments of du and dv into moments of x and y, by one factor after another.
         const auto x = [&](V u, V v) HWY_ATTR { return hn::MulAdd(xu, u, hn::Mul(xv, v)); };
         const auto y = [&](V u, V v) HWY_ATTR { return hn::MulAdd(yu, u, hn::Mul(yv, v)); };
         const auto add = [&](int i, V value) HWY_ATTR { m[i] = hn::Add(m[i], value); };

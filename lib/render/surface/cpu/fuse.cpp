@@ -12,7 +12,7 @@ namespace stx::surface {
 namespace shared {
 namespace {
 
-/// What one source has in the pixels of a row of a tile.
+/// The samples that one source has in the pixels of a row of a tile, summed up for each pixel.
 struct RowRange {
     std::array<float, kTile> low, high;            ///< least and greatest sample
     std::array<std::uint32_t, kTile> any, common;  ///< flags of any, and of all that are there
@@ -21,8 +21,8 @@ struct RowRange {
 /// Pixels of a row that are looked at together.
 constexpr int kRun = 8;
 
-/// Of pixels of S x S samples each, in the runs that have some of `wanted`, a bit each; others have
-/// nothing. False when there is nothing in any of them.
+/// Sums up pixels of S x S samples each. Only runs of pixels with some bit of `wanted` are looked
+/// at; the others count as empty. False when the source has no sample in any of them.
 template <int S>
 bool summarisePixels(const float* lines, int stride, std::uint32_t wanted, RowRange& out) {
     constexpr int kSide = kRun * S;
@@ -35,7 +35,7 @@ bool summarisePixels(const float* lines, int stride, std::uint32_t wanted, RowRa
             }
             continue;
         }
-        // Down the columns first, which vectors do.
+        // Columns are added up first, since vectors can do that.
         const float* const from = lines + begin * S;
         std::array<float, kSide> low, high;
         std::array<std::uint32_t, kSide> any, common;
@@ -106,7 +106,7 @@ struct Fuser : Votes {
 
 #include "shaders/shared/surface_fuse.glsl"
 
-    /// fuseSamples(), of a pixel in which only the sources `among` may have something.
+    /// Calls fuseSamples() for a pixel in which only the sources `among` may have samples.
     void showSamples(std::span<const int> among, int column, int row) {
         ShownSamples shown;
         fuseSamplesOf({locals.first(tile.count), grid, axis, tile.step, tile.x, tile.y}, among,
@@ -239,7 +239,7 @@ void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, cons
 TilePixels fuseSettled(std::span<const LocalSource> sources, const DepthAxis& axis, int tileX,
                        int tileY, int columns, int rows, int perPixel, Pieces& pieces) {
     static thread_local TileMiddles middles;
-    // Its first pixel is that of the apron.
+    // The first pixel of its rows belongs to the apron.
     shared::Fuser fuser(sources, kMiddles, axis, tileX - kMiddles.apron, tileY - kMiddles.apron);
     settlePixels(sources, axis, fuser.tile.step, perPixel, middles);
     const std::uint32_t inside = columns == kTile ? ~0u : (1u << columns) - 1;

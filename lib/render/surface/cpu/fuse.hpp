@@ -20,7 +20,7 @@ struct Pieces {
     std::vector<std::uint16_t> pixel;    ///< column + kTile * row in the tile
 
     void clear();
-    /// A piece that has `of` of its share.
+    /// Adds a piece with the part `of` (0..1) of its share.
     void add(const Piece& piece, float of);
     void resize(std::size_t size);
     [[nodiscard]] std::size_t size() const { return x.size(); }

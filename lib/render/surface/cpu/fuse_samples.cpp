@@ -79,7 +79,7 @@ struct SampleFuser {
         bool mayGiveWay = false;
     };
 
-    /// A lane's number for each point.
+    /// The lanes whose owner is source i.
     static HWY_INLINE PointMask isOwner(Counts owner, int i) {
         return hn::RebindMask(PointTag(), hn::Eq(owner, hn::Set(CountTag(), i)));
     }
@@ -196,7 +196,9 @@ struct SampleFuser {
             if (!maybe) continue;
             const auto seesBetter = [&](int l, float px, float py, float pq) {
                 const auto& facet = facets.at(votes, l, px, py, pq);
-                return facet.any && votes.sizeIn(k, facet, votes.warp(k, px, py, pq)) > kSeesBetter;
+                return facet.any &&
+                       (votes.beyondCentres(facets.owners[l], px, py, pq) ||
+                        votes.sizeIn(k, facet, votes.warp(k, px, py, pq)) > kSeesBetter);
             };
             const Counts better =
                 withVotes(hn::Zero(di), points.x, points.y, points.q, maskOf(maybe), seesBetter);

@@ -61,7 +61,7 @@ struct Target {
                             static_cast<std::size_t>(rows) * stride * sizeof(float));
     }
 
-    /// The squares from those of the samples (x0, y0) to those of (x1, y1), which are in the tile.
+    /// The squares that hold the samples (x0, y0) to (x1, y1), which lie in the tile.
     [[nodiscard]] HWY_INLINE Squares squaresFrom(float x0, float y0, float x1, float y1) const {
         const auto square = [&](float at) {
             return std::min(static_cast<int>(at * squaresPerSample), 7);
@@ -180,7 +180,7 @@ struct Diagonals {
           bx(hn::Sub(p.x[3], p.x[1])),
           by(hn::Sub(p.y[3], p.y[1])),
           bq(hn::Sub(p.q[3], p.q[1])) {}
-    /// Twice the area, above 0 where the corners turn the right way.
+    /// Twice the area of a polygon; above 0 where its corners turn the right way.
     [[nodiscard]] HWY_INLINE Floats area() const {
         return hn::Sub(hn::Mul(ax, by), hn::Mul(ay, bx));
     }

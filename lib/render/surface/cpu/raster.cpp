@@ -166,7 +166,7 @@ struct CellRows {
             const FloatMask splits = hn::AndNot(quad, split);
             const FloatMask falls = hn::And(splits, hn::Lt(falling, rising));
             const FloatMask rises = hn::AndNot(falls, splits);
-            // With two links that meet: one of the triangles.
+            // Two links that meet make one of the triangles.
             const FloatMask alone = hn::Not(split);
             const FloatMask upperLeft = hn::And(alone, hn::And(linkTop, linkLeft));
             const FloatMask upperRight = hn::And(alone, hn::And(linkTop, linkRight));
@@ -316,7 +316,8 @@ HWY_INLINE Squares squaresAround(const Target& t, const Extent& extent) {
     const float x1 = hn::GetLane(hn::MaxOfLanes(d, extent.x1));
     const float y1 = hn::GetLane(hn::MaxOfLanes(d, extent.y1));
     if (!(x0 <= x1 && y0 <= y1)) return 0;
-    // From samples of the apron's corner on to pixels of the tile, and one more.
+    // Turns indices of samples, which begin in the apron, into pixels of the tile, and adds one
+    // pixel on each side.
     const auto clamped = [](float at) {
         return std::clamp(at, 0.0f, static_cast<float>(kTile - 1));
     };

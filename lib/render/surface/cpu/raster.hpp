@@ -28,16 +28,17 @@ inline constexpr Squares kAllSquares = ~Squares{0};
 
 /// What rasteriseSource() may leave out or draw larger.
 struct RasterNeeds {
-    /// Samples of other squares are not asked for, and hold anything. Of tiles without an apron.
+    /// The squares that are asked for; samples of others hold anything afterwards. Only for tiles
+    /// without an apron.
     Squares squares = kAllSquares;
-    /// What is near an edge of its source reaches half a sample farther: no pixel that it touches
-    /// goes without it.
+    /// Surfaces near an edge of their source reach half a sample farther, so that each pixel that
+    /// they touch gets its sample.
     bool reachFromEdges = false;
-    /// With kMiddles: becomes, of each block, the squares that it may be drawn in, those a pixel
-    /// around included. May be empty.
+    /// With kMiddles: for each block, gets the squares that the block may be drawn in, with those a
+    /// pixel around. May be empty.
     std::span<Squares> drawnIn{};
-    /// That of an earlier call: blocks that are in no square that is asked for are passed over. May
-    /// be empty.
+    /// `drawnIn` of an earlier call: blocks that lie in no square that is asked for are left out.
+    /// May be empty.
     std::span<const Squares> of{};
 };
 

@@ -31,7 +31,7 @@ struct Settler {
     int perPixel;
     TileMiddles& out;
 
-    /// What a share of depth is of, in q.
+    /// The q by which a share of the depth is multiplied.
     template <class D, class V>
     HWY_INLINE V scaleOf(D d, V q) const {
         return axis.inverse ? q : hn::Set(d, 1.0f);
@@ -43,107 +43,135 @@ struct Settler {
         return hn::MulAdd(hn::Set(d, share), scaleOf(d, q), hn::Mul(hn::Set(d, step), steps));
     }
 
-    /// addSource(), isSimple() and alsoShows() of that code, for the pixels of a row whose range in
-    /// a pixel is what their slope makes of it.
-    HWY_INLINE void summariseRow(int row) const {
-        const hn::CappedTag<float, 16> d;
-        const hn::RebindToUnsigned<decltype(d)> du;
-        using V = hn::Vec<decltype(d)>;
-        using U = hn::Vec<decltype(du)>;
-        const int n = static_cast<int>(hn::Lanes(d));
-        const int stride = kMiddles.stride();
-        const bool inside = row > 0 && row <= kTile;
-        const auto r = static_cast<std::size_t>(row);
+    using Floats = hn::CappedTag<float, 16>;
+    using Words = hn::RebindToUnsigned<Floats>;
+    using V = hn::Vec<Floats>;
+    using U = hn::Vec<Words>;
+    using M = hn::Mask<Floats>;
+
+    /// What the sources show at some pixels of a row. Sources are bits.
+    struct Summary {
+        V front, sum, count;  ///< the nearest surface, and the mean of those who show it
+        V nearest;            ///< of the samples that are not sure
+        V slopeX, slopeY;     ///< of `front`, a pixel
+        U shown, behind;      ///< who shows `front`, and who something behind it
+        U others;             ///< who is not sure
+    };
+    static HWY_INLINE M asFloats(hn::Mask<Words> mask) { return hn::RebindMask(Floats(), mask); }
+    static HWY_INLINE hn::Mask<Words> asBits(M mask) { return hn::RebindMask(Words(), mask); }
+    static HWY_INLINE hn::Mask<Words> flagged(V q, std::uint32_t flags) {
+        const Words du;
+        return hn::Ne(hn::And(hn::BitCast(du, q), hn::Set(du, flags)), hn::Zero(du));
+    }
+
+    /// addSource() of surface_fuse.glsl: source `k`, whose samples are `at`.
+    HWY_INLINE void addSource(std::size_t k, const float* at, bool inside, Summary& s) const {
+        const Floats d;
+        const Words du;
         const V zero = hn::Zero(d);
-        const U none = hn::Zero(du);
-        const auto asFloats = [&](auto mask) HWY_ATTR { return hn::RebindMask(d, mask); };
-        const auto asBits = [&](auto mask) HWY_ATTR { return hn::RebindMask(du, mask); };
+        const V q = hn::LoadU(d, at);
+        const M there = hn::Gt(q, zero);
+        if (hn::AllFalse(d, there)) return;
+        const U bit = hn::Set(du, 1u << k);
+        const M notSure = asFloats(flagged(q, std::uint32_t{kSampleFlags}));
+        const M unsure = hn::And(there, notSure), sure = hn::AndNot(notSure, there);
+        s.others = hn::Or(s.others, hn::IfThenElseZero(asBits(unsure), bit));
+        s.nearest = hn::Max(s.nearest, hn::IfThenElseZero(unsure, q));
+        const V same = within(d, s.front, kSame);
+        const M has = hn::Gt(s.front, zero);
+        const M farther = hn::And(hn::And(sure, has), hn::Lt(q, hn::Sub(s.front, same)));
+        const M nearer = hn::And(sure, hn::Or(hn::Not(has), hn::Gt(q, hn::Add(s.front, same))));
+        s.behind = hn::Or(s.behind, hn::IfThenElseZero(asBits(farther), bit));
+        if (!hn::AllFalse(d, nearer)) {
+            s.behind = hn::Or(s.behind, hn::IfThenElseZero(asBits(nearer), s.shown));
+            s.shown = hn::IfThenZeroElse(asBits(nearer), s.shown);
+            s.sum = hn::IfThenZeroElse(nearer, s.sum);
+            s.count = hn::IfThenZeroElse(nearer, s.count);
+            s.front = hn::IfThenElse(nearer, q, s.front);
+            if (inside) {
+                const int stride = kMiddles.stride();
+                const V limit = hn::Mul(hn::Set(d, kLinkedSamples), scaleOf(d, q));
+                const V sx = slopeFrom(d, q, hn::LoadU(d, at - 1), hn::LoadU(d, at + 1), limit);
+                const V sy =
+                    slopeFrom(d, q, hn::LoadU(d, at - stride), hn::LoadU(d, at + stride), limit);
+                s.slopeX = hn::IfThenElse(nearer, sx, s.slopeX);
+                s.slopeY = hn::IfThenElse(nearer, sy, s.slopeY);
+            }
+        }
+        const M joins = hn::AndNot(farther, sure);
+        s.shown = hn::Or(s.shown, hn::IfThenElseZero(asBits(joins), bit));
+        s.sum = hn::Add(s.sum, hn::IfThenElseZero(joins, q));
+        s.count = hn::Add(s.count, hn::IfThenElseZero(joins, hn::Set(d, 1.0f)));
+    }
+
+    /// isSimple() of that code.
+    HWY_INLINE M isSimple(const Summary& s, M several) const {
+        const Floats d;
         // From the first to the last sample of a pixel.
         const V across =
             hn::Set(d, static_cast<float>(perPixel - 1) / static_cast<float>(perPixel));
-        for (int x = 0; x < kMiddlesSide; x += n) {
-            V front = zero, sum = zero, nearest = zero, slopeX = zero, slopeY = zero, count = zero;
-            U shown = none, behind = none, others = none;
-            for (std::size_t k = 0; k < sources.size(); ++k) {
-                const float* samples = sources[k].samples;
-                if (!samples) continue;
-                const float* at = samples + static_cast<std::ptrdiff_t>(row) * stride + x;
-                const V q = hn::LoadU(d, at);
-                const auto there = hn::Gt(q, zero);
-                if (hn::AllFalse(d, there)) continue;
-                const U bit = hn::Set(du, 1u << k);
-                const auto flagged = asFloats(hn::Ne(
-                    hn::And(hn::BitCast(du, q), hn::Set(du, std::uint32_t{kSampleFlags})), none));
-                const auto unsure = hn::And(there, flagged), sure = hn::AndNot(flagged, there);
-                others = hn::Or(others, hn::IfThenElseZero(asBits(unsure), bit));
-                nearest = hn::Max(nearest, hn::IfThenElseZero(unsure, q));
-                const V same = within(d, front, kSame);
-                const auto has = hn::Gt(front, zero);
-                const auto farther = hn::And(hn::And(sure, has), hn::Lt(q, hn::Sub(front, same)));
-                const auto nearer =
-                    hn::And(sure, hn::Or(hn::Not(has), hn::Gt(q, hn::Add(front, same))));
-                behind = hn::Or(behind, hn::IfThenElseZero(asBits(farther), bit));
-                if (!hn::AllFalse(d, nearer)) {
-                    behind = hn::Or(behind, hn::IfThenElseZero(asBits(nearer), shown));
-                    shown = hn::IfThenZeroElse(asBits(nearer), shown);
-                    sum = hn::IfThenZeroElse(nearer, sum);
-                    count = hn::IfThenZeroElse(nearer, count);
-                    front = hn::IfThenElse(nearer, q, front);
-                    if (inside) {
-                        const V limit = hn::Mul(hn::Set(d, kLinkedSamples), scaleOf(d, q));
-                        const V sx =
-                            slopeFrom(d, q, hn::LoadU(d, at - 1), hn::LoadU(d, at + 1), limit);
-                        const V sy = slopeFrom(d, q, hn::LoadU(d, at - stride),
-                                               hn::LoadU(d, at + stride), limit);
-                        slopeX = hn::IfThenElse(nearer, sx, slopeX);
-                        slopeY = hn::IfThenElse(nearer, sy, slopeY);
-                    }
-                }
-                const auto joins = hn::AndNot(farther, sure);
-                shown = hn::Or(shown, hn::IfThenElseZero(asBits(joins), bit));
-                sum = hn::Add(sum, hn::IfThenElseZero(joins, q));
-                count = hn::Add(count, hn::IfThenElseZero(joins, hn::Set(d, 1.0f)));
-            }
-            const auto has = hn::Gt(front, zero);
-            const V same = within(d, front, kSame);
-            const V range = hn::Mul(hn::Add(hn::Abs(slopeX), hn::Abs(slopeY)), across);
-            const auto several = hn::Gt(count, hn::Set(d, 1.0f));
-            const auto oneSurface =
-                hn::Le(range, hn::Mul(hn::Set(d, kOneSurface), scaleOf(d, front)));
-            const auto sureOfIt = hn::And(hn::And(several, hn::Le(range, within(d, front, kJump))),
-                                          hn::Le(nearest, hn::Add(front, same)));
-            const auto nothingElse = asFloats(hn::Eq(hn::Or(behind, others), none));
-            const auto simple = hn::And(hn::And(has, oneSurface), hn::Or(nothingElse, sureOfIt));
-            if (!hn::AllFalse(du, hn::Ne(others, none))) {
-                for (std::size_t k = 0; k < sources.size(); ++k) {
-                    const float* samples = sources[k].samples;
-                    const U bit = hn::Set(du, 1u << k);
-                    if (!samples || hn::AllFalse(du, hn::Ne(hn::And(others, bit), none))) continue;
-                    const V q =
-                        hn::LoadU(d, samples + static_cast<std::ptrdiff_t>(row) * stride + x);
-                    const auto mesh = hn::Eq(
-                        hn::And(hn::BitCast(du, q), hn::Set(du, std::uint32_t{kExtensionBit})),
-                        none);
-                    const auto shows = hn::And(asBits(hn::Gt(q, hn::Sub(front, same))), mesh);
-                    shown = hn::Or(shown, hn::IfThenElseZero(shows, hn::And(others, bit)));
-                }
-            }
-            const auto any = hn::Or(has, hn::Gt(nearest, zero));
-            const V q = hn::IfThenElse(simple, hn::Div(sum, hn::Max(count, hn::Set(d, 1.0f))),
+        const V range = hn::Mul(hn::Add(hn::Abs(s.slopeX), hn::Abs(s.slopeY)), across);
+        const M oneSurface = hn::Le(range, hn::Mul(hn::Set(d, kOneSurface), scaleOf(d, s.front)));
+        const M sureOfIt = hn::And(hn::And(several, hn::Le(range, within(d, s.front, kJump))),
+                                   hn::Le(s.nearest, hn::Add(s.front, within(d, s.front, kSame))));
+        const M nothingElse = asFloats(hn::Eq(hn::Or(s.behind, s.others), hn::Zero(Words())));
+        return hn::And(hn::And(hn::Gt(s.front, hn::Zero(d)), oneSurface),
+                       hn::Or(nothingElse, sureOfIt));
+    }
+
+    /// alsoShows() of that code: those of `others` that show `front`; `at` samples from a source's
+    /// first.
+    HWY_INLINE U alsoShow(const Summary& s, std::ptrdiff_t at) const {
+        const Floats d;
+        const Words du;
+        const V least = hn::Sub(s.front, within(d, s.front, kSame));
+        U shown = hn::Zero(du);
+        for (std::size_t k = 0; k < sources.size(); ++k) {
+            const float* samples = sources[k].samples;
+            const U asked = hn::And(s.others, hn::Set(du, 1u << k));
+            if (!samples || hn::AllFalse(du, hn::Ne(asked, hn::Zero(du)))) continue;
+            const V q = hn::LoadU(d, samples + at);
+            const auto shows = hn::And(asBits(hn::Gt(q, least)),
+                                       hn::Not(flagged(q, std::uint32_t{kExtensionBit})));
+            shown = hn::Or(shown, hn::IfThenElseZero(shows, asked));
+        }
+        return shown;
+    }
+
+    /// What the sources show at the pixels of a row, whose range in a pixel is what their slope
+    /// makes of it.
+    HWY_INLINE void summariseRow(int row) const {
+        const Floats d;
+        const Words du;
+        const V zero = hn::Zero(d);
+        const U none = hn::Zero(du);
+        const bool inside = row > 0 && row <= kTile;
+        const auto r = static_cast<std::size_t>(row);
+        for (int x = 0; x < kMiddlesSide; x += static_cast<int>(hn::Lanes(d))) {
+            const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(row) * kMiddles.stride() + x;
+            Summary s{zero, zero, zero, zero, zero, zero, none, none, none};
+            for (std::size_t k = 0; k < sources.size(); ++k)
+                if (sources[k].samples) addSource(k, sources[k].samples + at, inside, s);
+            const M several = hn::Gt(s.count, hn::Set(d, 1.0f));
+            const M simple = isSimple(s, several);
+            if (!hn::AllFalse(du, hn::Ne(s.others, none)))
+                s.shown = hn::Or(s.shown, alsoShow(s, at));
+            const M any = hn::Or(hn::Gt(s.front, zero), hn::Gt(s.nearest, zero));
+            const V q = hn::IfThenElse(simple, hn::Div(s.sum, hn::Max(s.count, hn::Set(d, 1.0f))),
                                        hn::IfThenElseZero(any, hn::Set(d, -1.0f)));
-            hn::StoreU(q, d, &out.q[r][static_cast<std::size_t>(x)]);
-            hn::StoreU(slopeX, d, &out.qx[r][static_cast<std::size_t>(x)]);
-            hn::StoreU(slopeY, d, &out.qy[r][static_cast<std::size_t>(x)]);
-            hn::StoreU(shown, du, &out.seenBy[r][static_cast<std::size_t>(x)]);
+            const auto column = static_cast<std::size_t>(x);
+            hn::StoreU(q, d, &out.q[r][column]);
+            hn::StoreU(s.slopeX, d, &out.qx[r][column]);
+            hn::StoreU(s.slopeY, d, &out.qy[r][column]);
+            hn::StoreU(s.shown, du, &out.seenBy[r][column]);
             hn::StoreU(hn::IfThenZeroElse(asBits(several), hn::Set(du, 1u)), du,
-                       &out.alone[r][static_cast<std::size_t>(x)]);
+                       &out.alone[r][column]);
         }
     }
 
     /// Which pixels of a row of the tile are settled, from the q around.
     HWY_INLINE void settleRow(int y) const {
-        const hn::CappedTag<float, 16> d;
-        using V = hn::Vec<decltype(d)>;
+        const Floats d;
         const int n = static_cast<int>(hn::Lanes(d));
         const auto r = static_cast<std::size_t>(y);
         std::uint32_t settled = 0, empty = 0;

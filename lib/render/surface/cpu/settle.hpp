@@ -16,7 +16,7 @@ inline constexpr int kMiddlesSide = kTile + 2;
 /// What a tile shows in the middles of its pixels, row by row of kPitch; pixel (x, y) of the tile
 /// is at (x + 1, y + 1).
 struct TileMiddles {
-    /// A row and room for whole vectors.
+    /// Elements of a row, with room behind it for whole vectors.
     static constexpr int kPitch = kMiddlesSide + 14;
     using Floats = std::array<std::array<float, kPitch>, kMiddlesSide>;
     using Bits = std::array<std::array<std::uint32_t, kPitch>, kMiddlesSide>;

@@ -27,7 +27,7 @@ constexpr int kNarrow = 3;
 
 /// Info::ownColour() at the position of each lane. Lanes without texels lose their
 /// weight.
-HWY_INLINE void findEdges(const Source& source, View& view, std::int32_t* edge) {
+HWY_INLINE void findEdges(const Source& source, GroupSource& view, std::int32_t* edge) {
     const int lastX = source.width - 1, lastY = source.height - 1;
     if (source.whole) {
         const hn::ScalableTag<float> d;
@@ -62,7 +62,7 @@ HWY_INLINE void findEdges(const Source& source, View& view, std::int32_t* edge) 
 
 /// Positions, Jacobians and weights of one source for a group.
 HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, std::uint32_t bit,
-                      float edgeWeight, View& out) {
+                      float edgeWeight, GroupSource& out) {
     const hn::ScalableTag<float> d;
     const hn::RebindToUnsigned<decltype(d)> du;
     using V = hn::Vec<decltype(d)>;
@@ -148,7 +148,7 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
 /// 1 (or alpha) for taps on the surface of the piece, 0 for others, of one lane; taps row by row,
 /// `out` aligned to a row.
 HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u, float v,
-                         const View& view, int baseU, int baseV, float out[kTaps * kTaps]) {
+                         const GroupSource& view, int baseU, int baseV, float out[kTaps * kTaps]) {
     const Source& source = *s.source;
     const auto& m = s.sourceFromPixel.m;
     const float x = g.x[lane], y = g.y[lane], q = g.q[lane];
@@ -168,7 +168,7 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
     const Rgba8Image* bytes = taps.page->texture->rgba8();
     if (taps.stepX == 1 && baseU >= taps.x0 && baseV >= taps.y0 && baseU + kTaps <= taps.x1 &&
         baseV + kTaps <= taps.y1 && (bytes || !source.hasAlpha)) {
-        // The same, a row of taps at once.
+        // The same for a row of taps at once.
         const hn::FixedTag<float, kTaps> d;
         const hn::RebindToSigned<decltype(d)> di;
         const auto far = hn::Set(d, kFarthestTap * scale), limit = hn::Set(d, allowed);
@@ -217,8 +217,8 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
 /// The texels of a view that fills its page, when the taps of all lanes that have weight are in it:
 /// `first` becomes the first of each lane, any of the others, whose taps weigh nothing. Null when
 /// taps must be looked at one lane at a time.
-HWY_INLINE const Rgba8Image* findRows(const Source& source, const View& view, const Lanes* bases,
-                                      std::int32_t* first) {
+HWY_INLINE const Rgba8Image* findRows(const Source& source, const GroupSource& view,
+                                      const Lanes* bases, std::int32_t* first) {
     const hn::ScalableTag<float> d;
     const hn::RebindToSigned<decltype(d)> di;
     if (!source.whole || source.width < kTaps || source.height < kTaps) return nullptr;
@@ -242,9 +242,9 @@ HWY_INLINE const Rgba8Image* findRows(const Source& source, const View& view, co
 
 /// The sources of a group, and the taps of each; one for each thread.
 struct GroupTaps {
-    View views[32];  ///< by source
-    int list[32];    ///< sources that some lane takes colours from
-    int count = 0;   ///< of the list
+    GroupSource views[32];  ///< by source
+    int list[32];           ///< sources that some lane takes colours from
+    int count = 0;          ///< of the list
     // By source: the first tap of each lane (column, row), what taps count, and whether they do.
     Lanes bases[32][2];
     Lanes kernels[32][kTaps * kTaps];
@@ -264,7 +264,7 @@ HWY_INLINE void placeSources(const Group& g, std::span<const ShadeSource> source
     }
 }
 
-/// The source of the most weight in each lane, -1 = none.
+/// The source that weighs most in each lane, -1 = none.
 HWY_INLINE void findBest(const Group& g, const GroupTaps& t, std::int8_t* best) {
     alignas(64) std::int32_t top[kGroup];
     Lanes topWeight;
@@ -273,7 +273,7 @@ HWY_INLINE void findBest(const Group& g, const GroupTaps& t, std::int8_t* best) 
         topWeight[l] = 0.0f;
     }
     for (int k = 0; k < t.count; ++k) {
-        const View& view = t.views[t.list[k]];
+        const GroupSource& view = t.views[t.list[k]];
         for (int l = 0; l < kGroup; ++l) {
             const bool better = view.weight[l] > topWeight[l];
             topWeight[l] = better ? view.weight[l] : topWeight[l];
@@ -310,9 +310,9 @@ HWY_INLINE void keepHeaviest(const Group& g, int most, GroupTaps& t) {
                        &weights[l]);
         }
     }
-    // Neighbours mostly leave out the same sources.
+    // Neighbouring pieces mostly leave out the same sources.
     const auto used = [&](int s) {
-        const View& view = t.views[s];
+        const GroupSource& view = t.views[s];
         for (int l = 0; l < g.count; ++l)
             if (view.weight[l] > 0.0f) return true;
         return false;
@@ -324,7 +324,7 @@ HWY_INLINE void keepHeaviest(const Group& g, int most, GroupTaps& t) {
 HWY_INLINE void findTaps(const Group& g, const ShadeSource& source, int s, GroupTaps& t) {
     const hn::ScalableTag<float> d;
     using V = hn::Vec<decltype(d)>;
-    const View& view = t.views[s];
+    const GroupSource& view = t.views[s];
     for (int l = 0; l < kGroup; l += static_cast<int>(hn::Lanes(d))) {
         const V shift = hn::Set(d, view.narrow ? -1.0f : -1.5f);
         hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.u[l]), shift)), d, &t.bases[s][0][l]);
@@ -347,7 +347,7 @@ HWY_INLINE void findTaps(const Group& g, const ShadeSource& source, int s, Group
 template <int kSide>
 HWY_INLINE void addMoments(int s, float kernel, GroupTaps& t, Lanes* moments) {
     const hn::ScalableTag<float> d;
-    const View& view = t.views[s];
+    const GroupSource& view = t.views[s];
     for (int l = 0; l < kGroup; l += static_cast<int>(hn::Lanes(d))) {
         hn::Vec<decltype(d)> m[kMoments];
         for (int i = 0; i < kMoments; ++i) m[i] = hn::LoadU(d, &moments[i][l]);
@@ -389,7 +389,7 @@ HWY_INLINE void weighTaps(int s, const GroupTaps& t, const Lanes* rows, TapWeigh
 template <int kSide>
 HWY_INLINE void fetchTaps(const Group& g, const Source& source, int s, const GroupTaps& t,
                           const TapWeights& weights, ColourSum* sums) {
-    const View& view = t.views[s];
+    const GroupSource& view = t.views[s];
     alignas(64) std::int32_t rowsFrom[kGroup];
     if (const Rgba8Image* bytes = findRows(source, view, t.bases[s], rowsFrom)) {
         for (int l = 0; l < g.count; ++l)
@@ -434,7 +434,7 @@ HWY_INLINE void writeColours(const Group& g, std::span<const ShadeSource> source
             if (bytes) value = glm::min(value, glm::vec3(1.0f));
             colours[l] = value;
         } else if (best[l] >= 0) {
-            const View& view = t.views[best[l]];
+            const GroupSource& view = t.views[best[l]];
             const Source& source = *sources[static_cast<std::size_t>(best[l])].source;
             colours[l] = glm::vec3(
                 source.colour(std::clamp(static_cast<int>(view.u[l]), 0, source.width - 1),

@@ -17,14 +17,16 @@ struct alignas(64) Lanes {
 };
 
 /// One source under a group of pieces.
-struct View {
+struct GroupSource {
     Lanes u, v;            ///< position in the source, pixels
     Lanes xu, xv, yu, yv;  ///< d(x, y in the frame) / d(u, v)
     Lanes weight;
     bool active = false;
-    /// Farther taps count nothing, pixels of the source along either axis (kNarrowReach).
+    /// How far taps reach along either axis, pixels of the source; taps beyond have no weight
+    /// (kNarrowReach).
     Lanes reach;
-    /// That is so of all pieces: three taps a side are enough, from the one before the nearest on.
+    /// All pieces have that short reach: three taps a side are enough, from the one before the
+    /// nearest on.
     bool narrow = false;
     /// A bit for each lane that is near an edge. All taps of others lie on one surface, fully
     /// covered.

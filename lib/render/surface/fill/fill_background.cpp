@@ -138,7 +138,7 @@ void putAverage(const Image<glm::vec4>& before, const OpenFrame& filled, int fac
     });
 }
 
-/// 0 up to `t` = 0, 1 from `t` = 1 on.
+/// Goes smoothly from 0 at `t` = 0 to 1 at `t` = 1.
 float smoothStep(float t) {
     t = std::clamp(t, 0.0f, 1.0f);
     return t * t * (3 - 2 * t);
@@ -168,7 +168,7 @@ bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, con
     const auto [farthest, nearest] = std::minmax_element(qs.begin(), qs.begin() + count);
     const float front = *nearest;
     const float range = front - *farthest + kLeastRange * frame.space.axis.relativeScale(front);
-    // All at once in vectors.
+    // Separate loops, of which compilers make vectors.
     for (std::size_t k = 0; k < count; ++k) {
         const float behind = (front - qs[k]) / range + kNearestWeight;
         weights[k] = behind * behind / (weights[k] * std::sqrt(weights[k]));
@@ -185,16 +185,113 @@ bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, con
     return true;
 }
 
+/// Fills rows of a frame at 1/`scale` of its size out of the same at half that. For one thread.
+class RowFiller {
+  public:
+    struct Of {
+        OpenFrame& frame;
+        std::span<const LocalSource> sources;
+        const Image<std::uint8_t>& distances;  ///< to surface
+        const Half& half;
+        int scale;
+        bool finest;  ///< colours of no larger frame come from it
+    };
+    RowFiller(const Of& of, const DistanceWords& words)
+        : of_(of), places_{{of.sources}}, rays_(words) {}
+
+    void fill(int y) {
+        const auto row = of_.distances.row(y);
+        open_.assign(row.size() + row.size() % 2, 0);
+        std::copy(row.begin(), row.end(), open_.begin());
+        of_.half.keepFilled(y, open_, filled_);
+        forWhere(
+            open_, [](std::uint8_t d) { return d > 0; }, [&](int x) { look(x, y); });
+    }
+    void finish() { putNear(); }
+
+  private:
+    /// Pixels of the frame that one of this one is the average of, along each side.
+    [[nodiscard]] int averaged() const { return of_.finest ? of_.scale : 1; }
+
+    void look(int x, int y) {
+        if (of_.frame.albedo.at(x, y).a >= kClosed) return;
+        const Sample beyond = of_.half.at(x, y);
+        const int distance = of_.distances.at(x, y);
+        const auto near = static_cast<float>(averaged() > 1 ? kNearSurfaceOfAverages
+                                             : of_.finest   ? kNearSurface
+                                                            : kNearSurfaceOfHalves);
+        // What looks at colours of halves is hardly ever beside surface there.
+        const bool unseen = !of_.finest && distance == 1 && !beyond.mixed;
+        const float far =
+            of_.half.q.empty() ? 0.0f : smoothStep(2.0f * static_cast<float>(distance) / near - 1);
+        if (unseen || far >= 1.0f) return put({x, y, beyond.colour, beyond.q}, beyond);
+        nearby_[rays_.count()] = {x, y, far, beyond};
+        rays_.add(x, y, distance);
+        if (rays_.full()) putNear();
+    }
+
+    void putNear() {
+        rays_.walk();
+        for (std::size_t i = 0; i < rays_.count(); ++i) {
+            const auto& [x, y, far, beyond] = nearby_[i];
+            FilledPixel fill{x, y, beyond.colour, beyond.q};
+            if (alongRays(of_.frame, of_.distances, rays_, i, averaged(), fill)) {
+                if (far > 0.0f && beyond.q > 0.0f) {
+                    fill.colour = glm::mix(fill.colour, beyond.colour, far);
+                    fill.q = glm::mix(fill.q, beyond.q, far);
+                }
+            } else if (!(beyond.q > 0.0f)) {
+                continue;
+            }
+            put(fill, beyond);
+        }
+        rays_.clear();
+    }
+
+    void put(const FilledPixel& fill, const Sample& beyond) {
+        if (!beyond.mixed || isHidden(fill)) putIn(of_.frame, fill);
+    }
+
+    /// Whether something hid the place from a source. What fills a pixel tells its depth roughly:
+    /// what is there may be farther away.
+    bool isHidden(const FilledPixel& fill) {
+        const float x = (static_cast<float>(fill.x) + 0.5f) * static_cast<float>(of_.scale);
+        const float y = (static_cast<float>(fill.y) + 0.5f) * static_cast<float>(of_.scale);
+        const int count = static_cast<int>(of_.sources.size());
+        const float apart = kFarthestShare * of_.frame.space.axis.relativeScale(fill.q) / kFarther;
+        for (int k = 0; k < count; ++k) {
+            const int s = (last_ + k) % count;
+            for (int step = 0; step <= kFarther; ++step) {
+                const float q = fill.q - apart * static_cast<float>(step);
+                if (!(q > 0.0f) || !places_.hides(s, x, y, q)) continue;
+                last_ = s;
+                return true;
+            }
+        }
+        return false;
+    }
+
+    struct Near {
+        int x, y;
+        float far;
+        Sample beyond;
+    };
+    Of of_;
+    shared::LookedAt places_;
+    int last_ = 0;  ///< the source that hid a place, which is likely to hide the next
+    RayBatch rays_;
+    std::array<Near, kRayBatch> nearby_;
+    std::vector<std::uint8_t> open_, filled_;
+};
+
 /// fillBackground() of a frame at 1/`scale` of its size; `finest` if it is not itself one that
 /// colours of a larger one come from. What lies amid what is filled, or amid what stays open, at
 /// half the size is like that; the rest is looked up in the sources.
 void fillLevel(OpenFrame& frame, std::span<const LocalSource> sources, int scale, bool finest) {
-    const int height = frame.q.height();
     const Image<std::uint8_t> distances = distancesToSurface(frame);
     const auto all = distances.pixels();
     if (std::ranges::find(all, std::uint8_t{0}) == all.end()) return;
-    std::uint8_t farthest = 0;
-    for (const std::uint8_t d : all) farthest = std::max(farthest, d);
+    const std::uint8_t farthest = *std::ranges::max_element(all);
     if (farthest == 0) return;
     Half half;
     if (farthest > kSurelyMet) {
@@ -202,84 +299,12 @@ void fillLevel(OpenFrame& frame, std::span<const LocalSource> sources, int scale
         OpenFrame smaller{half.albedo, half.q, frame.space};
         fillLevel(smaller, sources, 2 * scale, false);
     }
-
     const DistanceWords words(distances);
-    const int averaged = finest ? scale : 1;
-    const auto near = static_cast<float>(averaged > 1 ? kNearSurfaceOfAverages
-                                         : finest     ? kNearSurface
-                                                      : kNearSurfaceOfHalves);
     // Only closed pixels are read, so that no fill feeds on another.
-    parallelForBlocks(0, height, 8, [&](std::int64_t from, std::int64_t to) {
-        shared::LookedAt places{{sources}};
-        int last = 0;  // the source that hid a place, which is likely to hide the next
-        const auto toFill = [&](const FilledPixel& fill) {
-            const float x = (static_cast<float>(fill.x) + 0.5f) * static_cast<float>(scale);
-            const float y = (static_cast<float>(fill.y) + 0.5f) * static_cast<float>(scale);
-            const int count = static_cast<int>(sources.size());
-            // What fills a pixel tells its depth roughly: what is there may be farther away.
-            const float apart = kFarthestShare * frame.space.axis.relativeScale(fill.q) / kFarther;
-            for (int k = 0; k < count; ++k) {
-                const int s = (last + k) % count;
-                for (int step = 0; step <= kFarther; ++step) {
-                    const float q = fill.q - apart * static_cast<float>(step);
-                    if (!(q > 0.0f) || !places.hides(s, x, y, q)) continue;
-                    last = s;
-                    return true;
-                }
-            }
-            return false;
-        };
-        const auto put = [&](const FilledPixel& fill, const Sample& beyond) {
-            if (!beyond.mixed || toFill(fill)) putIn(frame, fill);
-        };
-        struct Near {
-            int x, y;
-            float far;
-            Sample beyond;
-        };
-        std::array<Near, kRayBatch> nearby;
-        RayBatch rays(words);
-        const auto putNear = [&] {
-            rays.walk();
-            for (std::size_t i = 0; i < rays.count(); ++i) {
-                const auto& [x, y, far, beyond] = nearby[i];
-                FilledPixel fill{x, y, beyond.colour, beyond.q};
-                if (alongRays(frame, distances, rays, i, averaged, fill)) {
-                    if (far > 0.0f && beyond.q > 0.0f) {
-                        fill.colour = glm::mix(fill.colour, beyond.colour, far);
-                        fill.q = glm::mix(fill.q, beyond.q, far);
-                    }
-                } else if (!(beyond.q > 0.0f)) {
-                    continue;
-                }
-                put(fill, beyond);
-            }
-            rays.clear();
-        };
-        std::vector<std::uint8_t> open, filled;
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            const auto look = [&](int x) {
-                if (frame.albedo.at(x, y).a >= kClosed) return;
-                const Sample beyond = half.at(x, y);
-                const int distance = distances.at(x, y);
-                // What looks at colours of halves is hardly ever beside surface there.
-                const bool unseen = !finest && distance == 1 && !beyond.mixed;
-                const float far = half.q.empty()
-                                      ? 0.0f
-                                      : smoothStep(2.0f * static_cast<float>(distance) / near - 1);
-                if (unseen || far >= 1.0f) return put({x, y, beyond.colour, beyond.q}, beyond);
-                nearby[rays.count()] = {x, y, far, beyond};
-                rays.add(x, y, distance);
-                if (rays.full()) putNear();
-            };
-            const auto row = distances.row(y);
-            open.assign(row.size() + row.size() % 2, 0);
-            std::copy(row.begin(), row.end(), open.begin());
-            half.keepFilled(y, open, filled);
-            forWhere(
-                open, [](std::uint8_t d) { return d > 0; }, look);
-        }
-        putNear();
+    parallelForBlocks(0, frame.q.height(), 8, [&](std::int64_t from, std::int64_t to) {
+        RowFiller filler({frame, sources, distances, half, scale, finest}, words);
+        for (int y = static_cast<int>(from); y < to; ++y) filler.fill(y);
+        filler.finish();
     });
 }
 

@@ -44,7 +44,7 @@ struct Half {
             mark[2 * x + 1] &= at[x + 1] | at[x + 2];
         }
     }
-    /// At pixel (x, y) of the frame.
+    /// The sample at pixel (x, y) of the frame.
     [[nodiscard]] Sample at(int x, int y) const {
         Sample sample;
         if (q.empty()) return sample;
@@ -55,7 +55,7 @@ struct Half {
         const float tu = x % 2 ? 0.25f : 0.75f, tv = y % 2 ? 0.25f : 0.75f;
         const std::array<float, 4> weights = {(1 - tu) * (1 - tv), tu * (1 - tv), (1 - tu) * tv,
                                               tu * tv};
-        // Open ones have neither colour, alpha nor q.
+        // Open samples have neither colour, alpha nor q.
         const glm::vec4 sum = weights[0] * albedo.at(x0, y0) + weights[1] * albedo.at(x1, y0) +
                               weights[2] * albedo.at(x0, y1) + weights[3] * albedo.at(x1, y1);
         if (sum.a == 0.0f) return sample;

@@ -31,7 +31,8 @@ void walkRaysImpl(const RayBatch::Start& start, glm::vec2 direction, std::size_t
     const VI none = hn::Set(di, RayBatch::kNone);
     for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
         const VF x0 = hn::LoadU(d, &start.x[i]), y0 = hn::LoadU(d, &start.y[i]);
-        // The pixels that are so far along, kNone where rays left the picture or are too long.
+        // The pixels at this distance along the rays, kNone where rays left the picture or are too
+        // long.
         const auto pixelsAt = [&](VF along) HWY_ATTR {
             const VF x = hn::Add(x0, hn::Mul(dx, along)), y = hn::Add(y0, hn::Mul(dy, along));
             const auto in =

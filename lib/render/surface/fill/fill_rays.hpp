@@ -15,7 +15,7 @@ namespace stx::surface {
 inline constexpr int kRays = 16;
 /// No ray is longer, pixels: what is farther weighs next to nothing beside what is near.
 inline constexpr float kLongestRay = 512;
-/// Pixels whose rays go together, direction by direction.
+/// The number of pixels whose rays go together, direction by direction.
 inline constexpr std::size_t kRayBatch = 128;
 
 /// Distances of the pixels of a picture from surface, the larger of columns and rows, so that no
@@ -52,13 +52,13 @@ class RayBatch {
 
     [[nodiscard]] bool full() const { return count_ == kRayBatch; }
     [[nodiscard]] std::size_t count() const { return count_; }
-    /// A pixel, `distance` from surface.
+    /// Adds a pixel that is `distance` from surface.
     void add(int x, int y, int distance);
     void clear() { count_ = 0; }
 
     /// Finds where the rays of all pixels meet surface.
     void walk();
-    /// By direction; the pixels of each in the order in which they were added.
+    /// The rays of each direction; their pixels come in the order in which they were added.
     [[nodiscard]] const std::array<Rays, kRays>& rays() const { return rays_; }
 
   private:

@@ -40,7 +40,7 @@ constexpr int kLeastDirections = 6;
 /// The ray is looked at from this share of q in front of the nearest rim to this share of q behind
 /// the farthest, or to kFarthestShare of that.
 constexpr float kInFront = 0.02f, kBehind = 0.05f;
-/// Depths that are tried on the way, and how many in a row must be hidden.
+/// The number of depths that are tried on the way, and how many in a row must be hidden.
 constexpr int kDepths = 48, kHiddenDepths = 2;
 /// Pixels behind a rim that tell its slope, while q changes by no more than this share from the rim
 /// to the first of them, and by no more than the other beside that from each to the next.
@@ -237,12 +237,12 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int wides
                 rows[static_cast<std::size_t>(y)].push_back(
                     continued(frame, sources, x, y, hidden, rims));
             };
-            // Farther from surface no direction meets any.
+            // No direction meets surface from farther away than this.
             forWhere(
                 distances.row(y), [&](std::uint8_t d) { return d > 0 && d <= reach; }, look);
         }
     });
-    // At the end, so that no fill feeds on another.
+    // Pixels are filled at the end, so that no fill feeds on another.
     Image<std::uint8_t> filled(frame.q.width(), height, 0);
     for (const auto& row : rows)
         for (const FilledPixel& fill : row) filled.at(fill.x, fill.y) = 1;

@@ -37,7 +37,7 @@ void distancesAlong(std::span<const glm::vec4> albedo, std::span<const float> q,
         const int count = std::min(64, width - x);
         std::uint64_t bits = closedBits(&albedo[first], &q[first], static_cast<std::size_t>(count));
         for (int at = 0; at < count;) {
-            // To the next pixel that is of the other kind.
+            // Goes on to the next pixel of the other kind.
             const std::uint64_t left = (begin < 0 ? ~bits : bits) >> at << at;
             at = std::min(std::countr_zero(left), count);
             if (at == count) break;
@@ -52,7 +52,7 @@ void distancesAlong(std::span<const glm::vec4> albedo, std::span<const float> q,
 /// Lowers the distances of a row to what those of the row before or after it tell.
 void distancesAcross(std::uint8_t* __restrict row, const std::uint8_t* __restrict other,
                      int width) {
-    // In bytes throughout, which vectors do sixteen at once and more.
+    // Bytes throughout: vectors take sixteen and more at once.
     const auto least = [](std::uint8_t a, std::uint8_t b) { return a < b ? a : b; };
     const auto next = [&](std::uint8_t d) {
         return static_cast<std::uint8_t>(least(d, kFarthestCounted - 1) + 1);

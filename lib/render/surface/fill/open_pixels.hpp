@@ -37,10 +37,10 @@ void putIn(OpenFrame& frame, const FilledPixel& fill);
     return frame.albedo.at(x, y).a >= kClosed && frame.q.at(x, y) > 0.0f;
 }
 
-/// At a pixel, counted by rows.
+/// The surface at a pixel, counted by rows.
 [[nodiscard]] inline Hit hitAt(const OpenFrame& frame, std::ptrdiff_t pixel, float distance) {
     const glm::vec4 c = frame.albedo.data()[pixel];
-    // What is divided by one stays the same.
+    // Division by one is left out, since it changes nothing.
     return {c.a == 1.0f ? glm::vec3(c) : glm::vec3(c) / c.a, frame.q.data()[pixel], distance};
 }
 

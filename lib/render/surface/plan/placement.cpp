@@ -9,12 +9,12 @@
 namespace stx::surface {
 namespace {
 
-/// What a block may reach out of its range by, relative to SourceBlock::reach, and the share of q
+/// How far a block may reach out of its range, as a part of SourceBlock::reach, and the share of q
 /// that rounding may add.
 constexpr float kBlockMargin = 1.05f, kBlockRounding = 1e-5f;
 /// What rounding may add to the terms that tell which way a block faces.
 constexpr double kFacingRounding = 1e-3;
-/// Where some of a block is behind the camera, it counts from this share of its largest w.
+/// A block that is in part behind the camera is cut off at this share of its largest w.
 constexpr float kNearestShare = 1e-4f;
 
 /// Whether all that is drawn of a block is seen from behind. `eye`: that of the frame in the space
@@ -49,7 +49,7 @@ bool isTurnedAway(const Source& s, const BlockRange& block, int x, int y, const 
 /// compilers make vectors of it.
 struct Corners {
     std::array<float, 8> x, y, w;  ///< homogeneous
-    struct Box {
+    struct DrawnBounds {
         float x0 = std::numeric_limits<float>::max(), y0 = x0, x1 = -x0, y1 = -x0;
 
         void add(float x, float y) {
@@ -60,7 +60,7 @@ struct Corners {
         }
     };
 
-    /// Of `side` x `side` pixels, of which (left, top) is the first.
+    /// The corners of the room of `side` x `side` pixels whose first is (left, top).
     Corners(const Warp& warp, float left, float top, float side, float qNear, float qFar) {
         const auto& m = warp.m;
         for (std::size_t k = 0; k < 8; ++k) {
@@ -72,8 +72,8 @@ struct Corners {
             w[k] = m[12] * u + m[13] * v + m[14] * q + m[15];
         }
     }
-    /// Where they are when all are in front of the camera.
-    [[nodiscard]] Box all() const {
+    /// The box around all corners, when all are in front of the camera.
+    [[nodiscard]] DrawnBounds all() const {
         std::array<float, 8> u, v;
         for (std::size_t k = 0; k < 8; ++k) {
             u[k] = x[k] / w[k];
@@ -85,8 +85,8 @@ struct Corners {
     }
     /// The box of the part that is in front of the camera: edges that go behind it are cut off
     /// where their depth is `cut`.
-    [[nodiscard]] Box inFront(float cut) const {
-        Box box;
+    [[nodiscard]] DrawnBounds inFront(float cut) const {
+        DrawnBounds box;
         for (std::size_t k = 0; k < 8; ++k) {
             if (w[k] > 0) box.add(x[k] / w[k], y[k] / w[k]);
             for (const std::size_t bit : {1u, 2u, 4u}) {
@@ -117,7 +117,7 @@ struct Placer {
         TileRange tiles;
         bool partlyBehind;
     };
-    /// Of `side` x `side` pixels from (x, y) on; none where they are not in the frame.
+    /// Where `side` x `side` pixels from (x, y) on are; nothing where they are not in the frame.
     [[nodiscard]] std::optional<Placed> place(const BlockRange& range, int x, int y,
                                               int side) const {
         const float margin = kBlockMargin * range.reach +
@@ -136,7 +136,7 @@ struct Placer {
                        static_cast<int>(x1) / kTile, static_cast<int>(y1) / kTile},
                       behind};
     }
-    /// First pixel of a block of the source.
+    /// The first pixel of a block of the source.
     [[nodiscard]] glm::ivec2 firstOf(std::uint32_t block) const {
         const int number = static_cast<int>(block);
         return kBlock * glm::ivec2(number % source.blocksX, number / source.blocksX);
@@ -181,7 +181,7 @@ std::vector<PlacedBlocks> placedBlocks(const FrameSource& f, const PixelSpace& s
             add(*at, f.pixelFromSource * glm::dvec4(region.middle, 1.0), region.begin, region.end);
             continue;
         }
-        // It may be large in the frame, and its middle tells little.
+        // Such a block may be large in the frame, so that its middle says little.
         for (std::uint32_t i = region.begin; i < region.end; ++i) {
             const std::uint32_t number = f.source->planned[i];
             const BlockRange& block = f.source->blocks[number];

@@ -6,7 +6,7 @@
 
 namespace stx::surface {
 
-/// Tiles of a frame, the last ones included.
+/// A range of tiles of a frame; the last ones belong to it.
 struct TileRange {
     int x0, y0, x1, y1;
 };
@@ -16,7 +16,7 @@ struct PlacedBlocks {
     TileRange tiles;           ///< all that they may show in
     double q;                  ///< in the frame, of their middle
     std::uint32_t begin, end;  ///< they, in Source::planned
-    /// Some of them is behind the camera: their middle may be anywhere.
+    /// A part of them is behind the camera: their middle may be anywhere.
     bool partlyBehind;
 };
 

@@ -13,10 +13,11 @@ namespace {
 /// With sixteen times as many, pictures of balls, eggs and tori from octahedral:4 differ by at most
 /// 0.1 dB, and drawing spot from 16 views takes a tenth longer.
 constexpr double kMostPlaces = 1 << 16;
-/// But they lie no farther apart than this, pixels of the frame: of hundreds of views.
+/// The farthest that such pixels lie apart, pixels of the frame, when there are hundreds of views.
 constexpr double kFarthestApart = kTile / 2;
-/// Sources that show a place, where so many do. One may show it at its very edge, and votes remove
-/// what no other source supports: with one, the same balls are 1.4 dB and the eggs 1.2 dB worse.
+/// A place is shown well enough by so many sources. One alone may show it at its very edge, and
+/// votes remove what no other source supports: with one, the same balls are 1.4 dB and the eggs 1.2
+/// dB worse.
 constexpr int kEnough = 2;
 /// Side of the cells in which the nearest place hides what is behind it, pixels of the frame.
 constexpr int kCell = 8;
@@ -93,7 +94,7 @@ class PlacesOf {
         return (std::abs(a.z * b.y - b.z * a.y) + std::abs(b.z * a.x - a.z * b.x)) /
                std::max(area, 1e-12f);
     }
-    /// A power of two, so that the pixels of blocks are evenly apart.
+    /// The step is a power of two, so that the pixels of all blocks are evenly apart.
     [[nodiscard]] int pixelsApart(const BlockRange& block, int x0, int y0, double apart) const {
         constexpr float half = 0.5f * kBlock;
         const glm::vec4 h =
@@ -212,7 +213,7 @@ void addSourcesOfPlaces(SurfaceFrame& frame, std::span<const std::vector<PlacedB
     };
     Nearest nearest(camera);
     std::mutex mutex;
-    // By source: its places in tiles that are not built from it.
+    // For each source, its places in tiles that are not built from it.
     std::vector<std::vector<ShownPlace>> others(frame.sources.size());
     parallelFor(0, count, [&](std::int64_t i) {
         const auto k = static_cast<std::size_t>(i);
