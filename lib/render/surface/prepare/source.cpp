@@ -260,7 +260,7 @@ float typicalDist(const Source& s, const Draft& d) {
 void prepareUnread(Source& s) {
     s.hasAlpha = s.view->unread->open;
     s.validShare = s.view->unread->validShare;
-    s.placeOfBlock.assign(s.blocks.size(), Source::kAllPruned);
+    s.placeOfBlock.assign(static_cast<std::size_t>(s.blocksX) * s.blocksY, Source::kAllPruned);
 }
 
 /// Links, edges, planar pieces and outlines of a source, from its points.
@@ -274,8 +274,8 @@ void prepareSource(Source& s, const RenderSettings& settings, bool blends,
     if (s.view->depthBits < 32) s.step = static_cast<float>(s.view->depthCode().step());
     s.blocksX = (s.width + kBlock - 1) / kBlock;
     s.blocksY = (s.height + kBlock - 1) / kBlock;
-    s.blocks.resize(static_cast<std::size_t>(s.blocksX) * s.blocksY);
     if (s.view->unread) return prepareUnread(s);
+    s.blocks.resize(static_cast<std::size_t>(s.blocksX) * s.blocksY);
     Draft d = draftOf(s);
     const DraftCounts counts = countPixels(d.q.data(), d.covered.data(), d.q.count());
     s.hasAlpha = counts.covered < static_cast<std::int64_t>(d.covered.count());

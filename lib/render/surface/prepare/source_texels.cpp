@@ -75,6 +75,7 @@ void addBounds(const Source& s, Bounds& bounds) {
         if (unread->bounds.empty()) return;
         bounds.add(unread->bounds.min);
         bounds.add(unread->bounds.max);
+        return;
     }
     for (int by = 0; by < s.blocksY; ++by) {
         for (int bx = 0; bx < s.blocksX; ++bx) {
