@@ -18,7 +18,6 @@
 #include "formats/files/pipes.hpp"
 #include "formats/files/temporaries.hpp"
 #include "lib/base/parallel.hpp"
-#include "lib/base/printable.hpp"
 #include "tools/stop_signals.hpp"
 
 namespace stx::tools {

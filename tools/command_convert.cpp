@@ -10,7 +10,6 @@
 #include "formats/imagesets/patterns.hpp"
 #include "formats/stx/mesh_views.hpp"
 #include "lib/base/stopwatch.hpp"
-#include "lib/capture/capture.hpp"
 #include "lib/render/around/around.hpp"
 #include "tools/batch.hpp"
 #include "tools/commands.hpp"
@@ -523,7 +522,7 @@ void addSetFiles(Command& c, const std::shared_ptr<ConvertOptions>& o) {
 void addSetCameras(Command& c, const std::shared_ptr<ConvertOptions>& o) {
     const char* sets = kSetHeading;
     const auto numbers = [&](const char* name, const char* type, const char* help,
-                             std::vector<double*> to) {
+                             const std::vector<double*>& to) {
         c.option(
              name, [name, to](const std::string& text) { return setTextOptions(name, text, to); },
              help)

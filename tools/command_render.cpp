@@ -3,7 +3,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "formats/any/sequences.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"

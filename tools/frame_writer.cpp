@@ -1,6 +1,5 @@
 #include "tools/frame_writer.hpp"
 
-#include <filesystem>
 #include <system_error>
 
 #include "lib/base/parallel.hpp"

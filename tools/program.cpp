@@ -4,7 +4,6 @@
 #include <unistd.h>
 #include <cerrno>
 #include <charconv>
-#include <chrono>
 #include <cstdio>
 #include <optional>
 #include <system_error>

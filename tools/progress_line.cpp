@@ -1,7 +1,6 @@
 #include "tools/progress_line.hpp"
 
 #include <cmath>
-#include <cstdio>
 
 #include <fmt/format.h>
 

@@ -12,8 +12,6 @@
 #include <system_error>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "formats/files/temporaries.hpp"
 
 namespace stx {

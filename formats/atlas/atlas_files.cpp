@@ -1,7 +1,6 @@
 #include "formats/atlas/atlas_files.hpp"
 
 #include <algorithm>
-#include <map>
 
 #include "formats/atlas/atlas_floats.hpp"
 #include "formats/atlas/atlas_json.hpp"

@@ -24,7 +24,6 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <system_error>
 
 #include "formats/exr/exr_adapt.hpp"

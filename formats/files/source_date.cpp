@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <cstdlib>
-#include <string_view>
 
 #include <fmt/format.h>
 

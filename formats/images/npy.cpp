@@ -7,14 +7,12 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstring>
 #include <memory>
 #include <optional>
 
 #include <glm/gtc/packing.hpp>
 
-#include "formats/images/reader.hpp"
 #include "lib/base/whole_number.hpp"
 
 namespace stx {

@@ -1,8 +1,6 @@
 // Our own cameras.json, for everybody whose program writes none of the other formats. See
 // README.md here.
 
-#include <cmath>
-
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/poses.hpp"

@@ -8,7 +8,6 @@
 
 #include "formats/exr/environment_exr.hpp"
 #include "formats/files/messages.hpp"
-#include "formats/images/images.hpp"
 #include "formats/imagesets/export_colmap.hpp"
 #include "formats/imagesets/export_files.hpp"
 

@@ -1,7 +1,5 @@
 #include "formats/imagesets/recognise.hpp"
 
-#include <algorithm>
-#include <array>
 #include <fstream>
 #include <optional>
 

@@ -1,8 +1,6 @@
 #include "formats/meshes/meshes.hpp"
 
 #include <algorithm>
-#include <cctype>
-#include <cstring>
 
 #include "formats/files/deflate.hpp"
 #include "formats/images/images.hpp"

@@ -1,7 +1,6 @@
 #include "formats/meshes/text_encoding.hpp"
 
 #include <cstdint>
-#include <cstring>
 
 namespace stx {
 namespace {

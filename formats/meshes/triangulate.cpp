@@ -1,6 +1,5 @@
 #include "formats/meshes/triangulate.hpp"
 
-#include <cmath>
 #include <cstdint>
 
 namespace stx {

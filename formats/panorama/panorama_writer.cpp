@@ -2,7 +2,6 @@
 #include <initializer_list>
 
 #include "formats/any/open.hpp"
-#include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/environment/environment_files.hpp"
 #include "formats/images/frames.hpp"

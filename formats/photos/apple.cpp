@@ -1,7 +1,6 @@
 // Apple's depth: what its XMP says (in HEIC and JPEG alike), and JPEGs whose depth is a later
 // picture of the file (MPF).
 
-#include <algorithm>
 #include <cmath>
 
 #include "formats/photos/readers.hpp"

@@ -2,7 +2,6 @@
 
 #include <lcms2.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <memory>
 

@@ -5,7 +5,6 @@
 #include "lib/base/counted.hpp"
 #include "lib/base/whole_number.hpp"
 #include "lib/capture/capture.hpp"
-#include "lib/capture/rasterizer.hpp"
 #include "lib/model/splat_cloud.hpp"
 #include "lib/quality/capture_quality.hpp"
 

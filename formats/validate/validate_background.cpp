@@ -1,7 +1,6 @@
 #include "formats/validate/validate_background.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "formats/mpeg4/mapping/background.hpp"
 

@@ -1,7 +1,6 @@
 #include "formats/validate/validate_mpeg4.hpp"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <map>
 #include <set>

@@ -1,7 +1,6 @@
 #include "lib/background/frame_warp.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 

@@ -1,7 +1,6 @@
 #include "lib/background/moving_cameras.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "lib/background/background_vote.hpp"
 #include "lib/background/key_background.hpp"

@@ -278,7 +278,7 @@ Result<void> withCapturedViews(
         Job part;
         part.workFor(job);
         part.onProgress = job.onProgress;
-        const auto done =
+        auto done =
             use(std::make_unique<CapturedViews>(
                     mesh, std::move(headers),
                     std::vector<ViewImageKinds>(numbers.size(), subject.kinds), settings, blind),

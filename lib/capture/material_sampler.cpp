@@ -1,7 +1,6 @@
 #include "lib/capture/material_sampler.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "lib/base/rounding.hpp"

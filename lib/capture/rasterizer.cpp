@@ -185,7 +185,7 @@ bool Rasterizer::clipSpan(const SetUp& s, double y, double step, double origin, 
                           int& to) {
     // A few samples are asked one by one.
     if (to - from < kFew) {
-        const auto& [p, q, r] = s.edge;
+        const auto &p = s.edge[0], &q = s.edge[1], &r = s.edge[2];
         const double atP = p.b * y + p.c, atQ = q.b * y + q.c, atR = r.b * y + r.c;
         const auto inside = [&](int i) {
             const double x = origin + i * step;

@@ -1,6 +1,5 @@
 #include "lib/model/srgb8.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>

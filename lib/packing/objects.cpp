@@ -17,7 +17,7 @@ Result<void> checkPackObjects(const std::vector<PackObject>& objects) {
             return fail(ErrorCode::usage,
                         "two objects are called '{}'; --names gives each a name of its own",
                         o.name);
-        const auto where = [&](Error error) {
+        const auto where = [&](const Error& error) {
             return tl::unexpected(error.at(fmt::format("object '{}'", o.name)));
         };
         if (const auto ok = o.bundle.check(); !ok) return where(ok.error());

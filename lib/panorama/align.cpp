@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <mutex>
 
 #include "lib/base/counted.hpp"
 #include "lib/base/median.hpp"

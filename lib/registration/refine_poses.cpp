@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <span>
 
 #include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"

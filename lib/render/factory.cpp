@@ -143,7 +143,7 @@ PageSet inFront(const PageSet& set, const RenderSettings& settings, Job& job) {
     if (std::none_of(views.begin(), views.end(), isBackground) ||
         std::all_of(views.begin(), views.end(), isBackground))
         return matched(set);
-    const PageSet front = matched(set.part(false));
+    PageSet front = matched(set.part(false));
     if (settings.fill != Fill::background) return front;
     return front.before(set.part(true).inLightOf(front));
 }

@@ -117,7 +117,7 @@ Result<Sheet> sheetOf(const ViewTable& table, const SheetSettings& settings, Job
     for (int i = 0; i < plan.shown; ++i) places[static_cast<std::size_t>(plan.groupAt(i))] = i;
     std::atomic<std::int64_t> points = 0, done = 0;
     const auto draw = [&](std::size_t number,
-                          std::shared_ptr<const ReferenceView> read) -> Result<void> {
+                          const std::shared_ptr<const ReferenceView>& read) -> Result<void> {
         const ReferenceView& view = *read;
         points += view.pointCount();
         job.progress(++done, content.groups, "views");

@@ -73,7 +73,8 @@ bool lacksAxes(const Bundle& bundle) {
 }  // namespace
 
 Result<SplatCloud> splatsOfBundle(Bundle bundle, const SplatSettings& settings, Job& job) {
-    std::ranges::stable_partition(bundle.views, [](const auto& v) { return v.background; });
+    std::stable_partition(bundle.views.begin(), bundle.views.end(),
+                          [](const auto& v) { return v.background; });
     STX_CHECK(checkPeak(settings.most > 0 ? peak::kFewerSplats : peak::kSplats, bundle.views,
                         job.limits));
     if (lacksAxes(bundle)) {

@@ -31,7 +31,7 @@ py::array_t<T> numbersFrom(py::handle value, const char* name, const char* expec
 /// An array as it is, of one of the kinds of numbers and with these axes; -1: of any length.
 py::array imageFrom(py::handle value, const char* name, bool fits, const char* expected) {
     if (!fits) refuse("{} is {}; {} is expected", name, described(value), expected);
-    const auto array = py::reinterpret_borrow<py::array>(value);
+    auto array = py::reinterpret_borrow<py::array>(value);
     for (py::ssize_t axis = 0; axis < 2; ++axis)
         if (array.shape(axis) < 1 || array.shape(axis) > Limits().maxImageSide)
             refuse("{} is {}; each side is 1 to {} pixels", name, described(value),

@@ -28,7 +28,7 @@ DrawerPointer makeDrawer(const AnyModel& model, const py::dict& keywords, JobHan
     std::optional<Path> environment;
     if (const auto file = given.find("environment"); file && !py::isinstance<py::bool_>(*file))
         given.take("environment", environment);
-    const auto drawer = std::make_shared<Drawer>();
+    auto drawer = std::make_shared<Drawer>();
     if (handle) drawer->job.limits = handle->job.limits;
     drawer->renderer = runFor(drawer->job, handle, [&]() -> Result<std::unique_ptr<Renderer>> {
         Job& job = drawer->job;

@@ -73,7 +73,6 @@ OpenOptions openOptionsFrom(const Keywords& given) {
     given.take("depth_unit", set.depthUnit);
     given.take("depth", set.depthPattern);
     given.take("mask", set.maskPattern);
-    std::optional<NoDepth> noDepth;
     if (given.find("no_depth")) {
         NoDepth value = NoDepth::empty;
         given.choose("no_depth", value, {{"empty", NoDepth::empty}, {"unknown", NoDepth::unknown}});

@@ -1,6 +1,5 @@
 #include "tools/python/work.hpp"
 
-#include <cmath>
 #include <optional>
 
 #include <pybind11/stl.h>

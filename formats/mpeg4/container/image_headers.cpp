@@ -1,7 +1,5 @@
 #include "formats/mpeg4/container/image_headers.hpp"
 
-#include <array>
-
 #include "formats/files/byte_io.hpp"
 #include "formats/mpeg4/scene/document.hpp"
 

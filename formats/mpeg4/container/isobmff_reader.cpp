@@ -4,7 +4,6 @@
 #include <iterator>
 #include <ranges>
 #include <unordered_map>
-#include <unordered_set>
 
 #include "formats/mpeg4/bifs/descriptors.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"

@@ -1,7 +1,6 @@
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <unordered_set>
 
 #include "formats/mpeg4/mapping/background.hpp"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cassert>
 #include <unordered_map>
 
 #include "formats/files/no_case.hpp"

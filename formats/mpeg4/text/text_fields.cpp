@@ -1,6 +1,5 @@
 #include "formats/mpeg4/text/text_fields.hpp"
 
-#include <cstdio>
 #include <set>
 #include <span>
 

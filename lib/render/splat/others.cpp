@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
-#include "lib/render/splat/plan.hpp"
 
 namespace stx::splat {
 namespace {

@@ -1,7 +1,6 @@
 #include "lib/render/splat/cpu/cpu_splat.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <span>
 

@@ -31,7 +31,7 @@ class GlRenderer final : public Renderer {
                Limits limits)
         : context_(std::move(context)),
           settings_(std::move(settings)),
-          limits_(limits),
+          limits_(std::move(limits)),
           points_(makePointArrays(set, settings_.lighting.on())) {}
 
     ~GlRenderer() override { destroyIn(*context_, targets_); }

@@ -1,7 +1,6 @@
 #include "lib/render/splat/gpu/gpu_splat.hpp"
 
 #include <chrono>
-#include <cstring>
 #include <optional>
 
 #include "lib/base/parallel.hpp"
@@ -39,7 +38,7 @@ class GpuSplatRenderer final : public Renderer {
           set_(set),
           silhouettes_(set),
           settings_(std::move(settings)),
-          limits_(limits) {}
+          limits_(std::move(limits)) {}
 
     ~GpuSplatRenderer() override { destroyIn(*context_, resources_); }
 

@@ -1,7 +1,6 @@
 #include "lib/render/surface/cpu/fuse_samples.hpp"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstring>
 

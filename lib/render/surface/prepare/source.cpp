@@ -1,7 +1,6 @@
 #include "lib/render/surface/prepare/source.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 
 #include "lib/base/parallel.hpp"

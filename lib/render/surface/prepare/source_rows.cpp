@@ -6,7 +6,6 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <cmath>
 
 #ifndef STX_SOURCE_ROWS_ONCE
 #define STX_SOURCE_ROWS_ONCE
