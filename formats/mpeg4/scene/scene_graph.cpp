@@ -83,8 +83,8 @@ bool sameBits(const T& a, const T& b) {
                   std::is_same_v<T, glm::vec4> || std::is_same_v<T, Color> ||
                   std::is_same_v<T, Rotation>) {
         // -0 and NaN count as what they are.
-        return std::memcmp(&a, &b, sizeof(T)) ==
-               0;  // NOLINT(bugprone-suspicious-memory-comparison)
+        // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison)
+        return std::memcmp(&a, &b, sizeof(T)) == 0;
     } else {
         return a == b;
     }
