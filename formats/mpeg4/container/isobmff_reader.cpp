@@ -2,7 +2,6 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <ranges>
 #include <unordered_map>
 
 #include "formats/mpeg4/bifs/descriptors.hpp"
@@ -473,8 +472,8 @@ class Reader {
     /// PROTOs that a command declares are the scene's: who has them early lacks nothing.
     void keepProtos(const BifsDecoder& decoder, CommandFrame& frame) {
         const auto sceneIn = [](CommandFrame& in) -> ReplaceScene* {
-            for (Command& command : std::views::reverse(in.commands))
-                if (auto* scene = std::get_if<ReplaceScene>(&command)) return scene;
+            for (auto command = in.commands.rbegin(); command != in.commands.rend(); ++command)
+                if (auto* scene = std::get_if<ReplaceScene>(&*command)) return scene;
             return nullptr;
         };
         ReplaceScene* scene = sceneIn(frame);
