@@ -107,12 +107,11 @@ class Viewer {
 
     // How far a drag over the whole picture goes.
     orbit(right, down) {
-        const c = this.camera, up = unit(c.up);
-        let arm = turned(minus(c.eye, c.target), up, -right);
+        const c = this.camera, up = unit(c.up), {eye, target, turn} = this.data.start, pivot = turn ? target : c.target;
+        let arm = turned(minus(c.eye, pivot), up, -right);
         const side = unit(cross(up, arm)), angle = Math.acos(Math.max(-1, Math.min(1, dot(unit(arm), up))));
         arm = turned(arm, side, Math.max(0.01, Math.min(Math.PI - 0.01, angle - down)) - angle);
-        const {eye, target, turn} = this.data.start;
-        c.eye = plus(c.target, turn ? armWithin(arm, minus(eye, target), turn) : arm);
+        c.eye = plus(pivot, turn ? armWithin(arm, minus(eye, target), turn) : arm);
     }
     // A single view is turned by a few degrees only: what takes an object around takes it from end to end.
     pace() { return this.data.start.turn || 1; }
@@ -120,11 +119,17 @@ class Viewer {
         const c = this.camera, view = lookAt(c, 1, 1), arm = lengthOf(minus(c.eye, c.target));
         const scale = 2 * arm * Math.tan(c.fov * Math.PI / 360);
         const shift = plus(times(view.axes[0], -right * scale), times(view.axes[1], down * scale));
-        c.eye = plus(c.eye, shift);
         c.target = plus(c.target, shift);
+        if (!this.data.start.turn) return void (c.eye = plus(c.eye, shift));
+        // The eye of a single view stays; it looks at what the view shows.
+        const {eye, target, fov} = this.data.start, most = lengthOf(minus(eye, target)) * Math.tan(fov * Math.PI / 360);
+        const beside = minus(c.target, target), far = lengthOf(beside);
+        if (far > most) c.target = plus(target, times(beside, most / far));
     }
     zoom(factor) {
-        const c = this.camera;
+        const c = this.camera, {turn, fov} = this.data.start;
+        // From nearer or farther a single view has holes: its angle changes instead, from all of it to an eighth.
+        if (turn) return void (document.getElementById("fov").value = c.fov = Math.max(fov / 8, Math.min(fov, c.fov * factor)));
         c.eye = plus(c.target, times(minus(c.eye, c.target), factor));
     }
 

@@ -4,6 +4,7 @@ touch, and what is said where WebGL 2 is missing."""
 import contextlib
 import http.server
 import json
+import math
 import os
 import shlex
 import sys
@@ -150,11 +151,11 @@ def touched(test, browser):
 
 
 def single(test, browser):
-    """The page of one view begins at its pose, and no drag takes it around."""
+    """The page of one view begins at its pose, and nothing takes the eye far from it or to where the view shows nothing."""
     test.stx_run("convert", test.model, "-o", "one.mp4", "--views", "ring:1", "--size", "128x128")
     test.stx_run("extract", "one.mp4", "-o", "one.html")
     show(browser, test.path("one.html"), "")
-    arm = "unit(minus(viewer.camera.eye, viewer.camera.target))"
+    arm = "unit(minus(viewer.camera.eye, viewer.data.start.target))"
     at_home = "lengthOf(minus(viewer.camera.eye, viewer.data.cameras[0].position))"
     test.check(browser.ask(at_home) < 1e-9, "the page of one view begins at its pose")
     angle = f"Math.acos(Math.min(1, dot({arm}, unit(minus(viewer.data.start.eye, viewer.data.start.target))))) * 180 / Math.PI"
@@ -164,6 +165,16 @@ def single(test, browser):
     browser.drag((20, 20), (620, 380))
     most = browser.ask(angle)
     test.check(few < most < 4.6, f"a drag over all of it turns it by {most:.2f} degrees")
+    eye = browser.ask("JSON.stringify(viewer.camera.eye)")
+    fov = browser.ask("viewer.data.start.fov")
+    browser.ask("viewer.zoom(1e-3)")
+    test.check(abs(browser.ask("viewer.camera.fov") - fov / 8) < 1e-9, "it is seen eight times larger at most")
+    browser.ask("viewer.pan(100, 40)")
+    aside = "Math.atan2(lengthOf(minus(viewer.camera.target, viewer.data.start.target)), lengthOf(minus(viewer.data.start.eye, viewer.data.start.target)))"
+    test.check(0 < browser.ask(aside) * 180 / math.pi < fov / 2 + 1e-6, "and no farther aside than it shows something")
+    browser.ask("viewer.zoom(1e3)")
+    test.check(browser.ask("viewer.camera.fov") == fov, "nor smaller than it is")
+    test.check(browser.ask("JSON.stringify(viewer.camera.eye)") == eye, "all from where the eye is")
 
 
 def odd_addresses(test, browser):
