@@ -71,10 +71,12 @@ constexpr std::uint64_t kBudgetPart = 32;
 constexpr std::uint64_t kKnown = 2;
 constexpr PeakMemory kPreparing = {"drawing", 32};
 
+/// See someViews().
+using LookAtView = std::function<Result<void>(std::size_t index, const ReferenceView& view)>;
+
 /// Reads those of `wanted`, into a spool where they would take more memory than there may be.
 Result<Bundle> readViews(const RenderOptions& o, const PeakMemory& drawing, const ViewTable& table,
-                         const std::vector<bool>& wanted,
-                         const std::function<Result<void>(std::size_t, const ReferenceView&)>& look,
+                         const std::vector<bool>& wanted, const LookAtView& look,
                          std::unique_ptr<FileSpool>& spool, Job& job) {
     const std::uint64_t limit = job.limits.maxMemoryBytes;
     std::uint64_t images = 0, inMemory = 0, pixels = 0;
@@ -206,9 +208,10 @@ Result<void> makeStill(const RenderOptions& o, const RenderSettings& settings,
                           "its summary is not that of its pixels: the file is damaged; write it "
                           "anew (stx refine)");
         };
-        STX_TRY(scene.model, readViews(o, drawingMemory(settings), *scene.table, wanted, check,
-                                       scene.spool, job));
+        // Where all views are read their summaries tell nothing.
         const bool all = std::ranges::find(wanted, false) == wanted.end();
+        STX_TRY(scene.model, readViews(o, drawingMemory(settings), *scene.table, wanted,
+                                       all ? nullptr : LookAtView(check), scene.spool, job));
         scene.table.reset();
         if (!all) {
             STX_TRY(scene.still, makeRenderer(std::get<Bundle>(scene.model), scene.summaries,

@@ -258,7 +258,7 @@ Result<void> shiftTogether(const SetView& set, const ImageSetOptions& options, C
     const SetShift shift = set.shift(values, stored.texture, job);
     if (shift.down != 0) {
         camera.cy -= shift.down;
-        step.changed(static_cast<std::int64_t>(stored.depth.count()));
+        if (shift.values == 0.0f) step.changed(static_cast<std::int64_t>(stored.depth.count()));
         job.note(
             fmt::format("view '{}': its camera looks {:.2f} pixels {}, as other pictures of "
                         "the set show",
@@ -289,7 +289,8 @@ Result<void> shiftTogether(const SetView& set, const ImageSetOptions& options, C
 }
 
 /// Makes distances of the stored values, and smooths the stairs of coarse ones. `noDepth`: what
-/// pixels without one are; those of nothing are made transparent.
+/// pixels without one are; those of nothing are made transparent. The camera's rows may move, too
+/// (shiftTogether()).
 Result<void> toDistances(const SetView& set, const ImageSetOptions& options, Camera& camera,
                          StoredView& stored, NoDepth& noDepth, RefineReport& report, Job& job) {
     const int bits = stored.depthBits;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "lib/render/factory.hpp"
+#include "tests/some_views.hpp"
 #include "tests/sweep/measures.hpp"
 #include "tests/sweep/random.hpp"
 
@@ -58,13 +59,7 @@ Outcome chosenViews(Pictures& pictures) {
                                     std::span(&captured.novel, 1));
     const auto count = std::ranges::count(needed, true);
     if (count == std::ssize(all.views)) return std::nullopt;
-    Bundle some = all;
-    for (std::size_t i = 0; i < needed.size(); ++i) {
-        if (needed[i]) continue;
-        ReferenceView header;
-        static_cast<ViewHeader&>(header) = some.views[i];
-        some.views[i] = std::move(header);
-    }
+    const Bundle some = withSomeViews(all, needed);
     Job job;
     STX_TRY(const auto ofAll, makeRenderer(Backend::cpu, all, settings, -1, job));
     STX_TRY(const auto ofSome, makeRenderer(some, summaries, nullptr, settings, job));

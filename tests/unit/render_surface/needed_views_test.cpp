@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "lib/render/factory.hpp"
+#include "tests/some_views.hpp"
 
 namespace stx {
 namespace {
@@ -79,17 +80,6 @@ struct Wall {
                                        const RenderSettings& settings = {}) const {
         return std::ranges::count(needed(picture, settings), true);
     }
-    /// The headers of those that are not needed, the others whole.
-    [[nodiscard]] Bundle only(const std::vector<bool>& needed) const {
-        Bundle some = bundle;
-        for (std::size_t i = 0; i < needed.size(); ++i) {
-            if (needed[i]) continue;
-            ReferenceView header;
-            static_cast<ViewHeader&>(header) = some.views[i];
-            some.views[i] = std::move(header);
-        }
-        return some;
-    }
 };
 
 const Wall& wall() {
@@ -118,7 +108,7 @@ TEST(NeededViews, DrawWhatAllDo) {
             const Camera camera = before(x, 0.3 * std::sin(x));
             const auto needed = wall().needed(camera, settings);
             EXPECT_LT(std::ranges::count(needed, true), kViews);
-            const Bundle some = wall().only(needed);
+            const Bundle some = withSomeViews(wall().bundle, needed);
             Job job;
             auto ofAll = makeRenderer(Backend::cpu, wall().bundle, settings, -1, job);
             auto ofSome = makeRenderer(some, wall().summaries, nullptr, settings, job);
