@@ -31,6 +31,7 @@ struct ExtractOptions {
     std::string colour;
     std::optional<int> quality;
     int mostSplats = 0;
+    double pixelsPerTexel = SplatSettings{}.pixelsPerTexel;
     OpenOptions open;
 };
 
@@ -124,7 +125,8 @@ Result<void> checkOptions(const ExtractOptions& o, const Wanted& w, const Comman
                                              : w.points ? " of points"
                                                         : "")));
     if (!w.splats)
-        STX_CHECK(command.refuse({"--max-splats"}, "is of splats; give --as splats, too"));
+        STX_CHECK(command.refuse({"--max-splats", "--pixels-per-texel"},
+                                 "is of splats; give --as splats, too"));
     if (w.ending == ".html")
         STX_CHECK(command.refuse({"--time"}, "is of what shows one moment; a page plays the film"));
     if (o.cameras == "colmap")
@@ -189,8 +191,10 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
     if (wanted.splats)
-        return extractSplats(o.input, o.open, o.output, o.time, o.refine,
-                             {.most = static_cast<std::size_t>(o.mostSplats)}, program);
+        return extractSplats(
+            o.input, o.open, o.output, o.time, o.refine,
+            {.pixelsPerTexel = o.pixelsPerTexel, .most = static_cast<std::size_t>(o.mostSplats)},
+            program);
     if (wanted.picture)
         return extractPicture(
             o.input, o.open, o.output,
@@ -287,6 +291,12 @@ void addExtract(CommandLine& line, Program& program) {
              "At most so many splats: flat pieces of one colour become larger ones (default: one "
              "for each point; a pruned atlas has each place once)")
         .range(1, 2000000000)
+        .takes("N");
+    c.option("--pixels-per-texel", o->pixelsPerTexel,
+             "Of splats: how many pixels wide a texel is in the pictures that they are for; their "
+             "outlines are right there, thinner in larger pictures and thicker in smaller ones "
+             "(default 1.5)")
+        .range(0.1, 100.0)
         .takes("N");
     c.option("--triangles", o->triangles,
              "Of surfaces (.glb): at most about so many triangles; what is least seen from beside "

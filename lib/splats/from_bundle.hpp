@@ -10,15 +10,21 @@ struct SplatSettings {
     /// Standard deviations of a splat for each half axis of its texel's ellipse (bake()). Of 0.5 to
     /// 0.9, pictures are best from 0.6 to 0.7, see tests/bench/pictures.md.
     double size = 0.65;
+    /// Pixels for each texel, above 0, in the pictures whose outlines are to be right. The rules of
+    /// drawing widen each splat by a share of a pixel, and outlines, where many lie behind each
+    /// other, by a whole one: so splats lie as far below the surface. In larger pictures the object
+    /// is then a little too thin, in smaller ones too thick. 1: the size of the views.
+    double pixelsPerTexel = 1.5;
     /// At most so many splats: flat pieces of one colour become one splat, those whose loss is
     /// least first; 0 = one for each texel.
     std::size_t most = 0;
 };
 
-/// A Gaussian for each place of a bundle, of the view that shows it finest: at its point, flat in
-/// its surface, along the axes of its ellipse (those of bake() where a view has none), with its
-/// colour and 0.99 of its alpha. Splats of background views come first. The coordinates are the
-/// world's: an origin is added, with a note where floats round it.
+/// A Gaussian for each place of a bundle, of the view that shows it finest: below its point (see
+/// SplatSettings::pixelsPerTexel), flat in its surface, along the axes of its ellipse (those of
+/// bake() where a view has none), with its colour and 0.99 of its alpha. Splats of background views
+/// come first. The coordinates are the world's: an origin is added, with a note where floats round
+/// it.
 ///
 /// Errors: those of bake(); (invalidInput) no point, more than 2^32 - 1; (failed) flat pieces do
 /// not come down to `most`, with the least that they come to; memory over the limit, cancelled.
