@@ -22,7 +22,8 @@ struct EdgeView {
 /// least for a half. How much of it single ones of a view have, 0..1, of at most about 600.
 [[nodiscard]] std::vector<float> sharesAtEdges(const EdgeView& view);
 
-/// Their median, of one view or of all; 1 when too few of them tell.
+/// Their median, of one view or of all; 1 when too few of them tell, or too few have the colour of
+/// what is behind.
 [[nodiscard]] float colourAtEdges(std::vector<float> shares);
 [[nodiscard]] float colourAtEdges(std::span<const EdgeView> views);
 
