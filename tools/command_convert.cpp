@@ -161,7 +161,12 @@ Result<Converted> convertStill(const std::filesystem::path& input,
         if (onTheWay)
             table = watchedViews(std::move(table), [&](auto i, auto& view) { tally.add(i, view); });
         keepFreedMemory();  // of a view, for the next one
-        return saveViews(*table, target, saveOptions(o, program), job);
+        SaveOptions options = saveOptions(o, program);
+        // Points and splats are drawn as discs, which look like noise to refine().
+        if (mesh)
+            options.summaries = mesh->triangles.empty() ? SaveOptions::Summaries::none
+                                                        : SaveOptions::Summaries::known;
+        return saveViews(*table, target, options, job);
     };
     if (mesh) {
         if (auto saved = withMeshViews(*mesh, *o.mesh, program, save); !saved)

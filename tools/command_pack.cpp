@@ -10,6 +10,7 @@
 #include "lib/base/stopwatch.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/period.hpp"
+#include "lib/packing/views_one_by_one.hpp"
 #include "lib/quality/prune_quality.hpp"
 #include "tools/batch.hpp"
 #include "tools/commands.hpp"
@@ -65,9 +66,9 @@ Result<void> setSize(const std::string& text, const Limits& limits, PackSettings
 }
 
 /// Packs so that the images that are written, not only the pages, are within settings.maxSize.
-Result<Atlas> packForFile(const Bundle& bundle, PackSettings settings, const std::string& output,
+Result<Atlas> packForFile(const ViewTable& views, PackSettings settings, const std::string& output,
                           const AtlasSaveOptions& save, Job& job) {
-    STX_TRY(auto atlas, pack(bundle, settings, job));
+    STX_TRY(auto atlas, pack(views, settings, job));
     if (largestImageSide(atlas, output, save) <= settings.maxSize) return atlas;
     // Some image holds two pictures of a page: beside each other, or one below the other.
     const int limit = settings.maxSize;
@@ -79,7 +80,7 @@ Result<Atlas> packForFile(const Bundle& bundle, PackSettings settings, const std
     settings.maxSize = limit / 2;
     Job quiet;  // the same notes again
     quiet.limits = job.limits;
-    auto smaller = pack(bundle, settings, quiet);
+    auto smaller = pack(views, settings, quiet);
     if (!smaller && smaller.error().code == ErrorCode::invalidInput)
         smaller.error().message += fmt::format(
             "; an image here holds two pictures, so that each gets half of the {} pixels", limit);
@@ -124,46 +125,81 @@ void addReportOf(const Atlas& atlas, double seconds, nlohmann::ordered_json& rep
                    {"seconds", seconds}});
 }
 
-/// One bundle into one atlas; of a film like the others of its period.
-Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, const PackPeriod* period,
-                       Program& program) {
-    const Stopwatch watch;
-    if (!opened) return propagate(opened);
-    Bundle bundle = std::move(*opened);
-    PackSettings settings = o.settings;
-    Bundle content;
-    if (period) {
-        content = period->content();
-        settings.contentOf = &content;
+/// What pruning left.
+struct PrunedTo {
+    PruneReport report;
+    bool measured = false;  ///< its PSNR is that of pictures
+
+    /// ", 48.1 % of the object's pixels kept, 39.2 dB measured".
+    [[nodiscard]] std::string text() const {
+        std::string out = fmt::format(", {:.1f} % of the object's pixels kept",
+                                      100.0 * static_cast<double>(report.keptPixels) /
+                                          static_cast<double>(report.sourcePixels));
+        if (measured && std::isfinite(report.psnr))
+            out += fmt::format(", {:.1f} dB measured", report.psnr);
+        return out;
     }
-    std::string pruned;
-    if (prunes(o)) {
-        auto report = period ? Result<PruneReport>(period->prune(bundle))
-                             : pruneOne(bundle, o, o.input, program.job);
-        if (!report) return propagate(report);
-        settings.sourcePixels = report->sourcePixels;
-        pruned = fmt::format(", {:.1f} % of the object's pixels kept",
-                             100.0 * static_cast<double>(report->keptPixels) /
-                                 static_cast<double>(report->sourcePixels));
-        if (o.minPsnr > 0 && !period && std::isfinite(report->psnr))
-            pruned += fmt::format(", {:.1f} dB measured", report->psnr);
-    }
+};
+
+/// Views into one atlas.
+Result<int> packViews(const PackOptions& o, std::unique_ptr<ViewTable> views, PackSettings settings,
+                      const std::optional<PrunedTo>& pruned, const Stopwatch& watch,
+                      Program& program) {
+    if (pruned) settings.sourcePixels = pruned->report.sourcePixels;
     const AtlasSaveOptions save = saveOptions(o, program);
-    auto atlas = packForFile(bundle, settings, o.output, save, program.job);
+    auto atlas = packForFile(*views, settings, o.output, save, program.job);
     if (!atlas) return tl::unexpected(atlas.error().at(fmt::format("'{}'", o.input)));
+    views.reset();
     STX_CHECK(program.job.checkCancelled());
-    STX_CHECK(writeAtlas(*atlas, o.output, program.job, save));
+    const std::string summary = summaryOf(*atlas);
+    nlohmann::ordered_json report = {
+        {"$schema", "pack-report.schema.json"}, {"input", o.input}, {"output", o.output}};
+    addReportOf(*atlas, 0, report);
+    STX_CHECK(writeAtlas(std::move(*atlas), o.output, program.job, save));
     const double seconds = watch.seconds();
+    report["seconds"] = seconds;
     program.sayNotes();
     program.say(fmt::format("{} ({}) → {} ({}), {}{}, {}",
                             std::filesystem::path(o.input).filename().string(),
                             humanBytes(bytesOf(o.input)), o.output, humanBytes(bytesOf(o.output)),
-                            summaryOf(*atlas), pruned, humanSeconds(seconds)));
-    nlohmann::ordered_json report = {
-        {"$schema", "pack-report.schema.json"}, {"input", o.input}, {"output", o.output}};
-    addReportOf(*atlas, seconds, report);
+                            summary, pruned ? pruned->text() : "", humanSeconds(seconds)));
     STX_CHECK(program.writeReport(report));
     return 0;
+}
+
+/// One moment into one atlas. Views are looked at one by one, unless pictures of all are compared.
+Result<int> packMoment(const PackOptions& o, Sequence& frames, std::size_t moment,
+                       Program& program) {
+    STX_TRY(auto views, frames.views(moment, program.job));
+    const Stopwatch watch;
+    std::optional<PrunedTo> pruned;
+    if (o.minPsnr > 0) {
+        STX_TRY(auto bundle, wholeBundle(std::move(views), program.job));
+        STX_TRY(const auto report, pruneOne(bundle, o, o.input, program.job));
+        pruned = PrunedTo{report, true};
+        views = tableOf(std::move(bundle));
+    } else if (prunes(o)) {
+        auto pruning = findPruning(*views, o.pruning, program.job);
+        if (!pruning) return tl::unexpected(pruning.error().at(fmt::format("'{}'", o.input)));
+        pruned = PrunedTo{pruning->report};
+        views = prunedViews(std::move(views), std::move(*pruning));
+    }
+    return packViews(o, std::move(views), o.settings, pruned, watch, program);
+}
+
+/// A frame of a film into one atlas, like the others of its period.
+Result<int> packFrame(const PackOptions& o, Bundle frame, const PackPeriod* period,
+                      Program& program) {
+    const Stopwatch watch;
+    PackSettings settings = o.settings;
+    Bundle content;
+    std::optional<PrunedTo> pruned;
+    if (period) {
+        content = period->content();
+        settings.contentOf = &content;
+        if (prunes(o)) pruned = PrunedTo{period->prune(frame)};
+    }
+    return packViews(o, viewsOf(frame), settings, pruned, watch, program);
 }
 
 /// Frames from `begin` to before `end`, an atlas each, all with the same rectangles.
@@ -194,8 +230,9 @@ Result<void> packPeriod(const PackOptions& o, Sequence& frames, std::size_t begi
         PackOptions one = o;
         one.output = targetOf(i);
         STX_CHECK(checkTarget(one.output, program));
-        STX_TRY(const int done, packBundle(one, frames.frame(i, program.job),
-                                           period ? &*period : nullptr, program));
+        STX_TRY(auto frame, frames.frame(i, program.job));
+        STX_TRY(const int done,
+                packFrame(one, std::move(frame), period ? &*period : nullptr, program));
         if (done != 0) return fail(ErrorCode::failed, "'{}' was not packed", one.output);
     }
     return {};
@@ -280,7 +317,8 @@ Result<int> packSheet(const PackOptions& o, Program& program) {
     PackSettings settings = o.settings;
     settings.objects = &joined.objects;
     const AtlasSaveOptions save = saveOptions(o, program);
-    STX_TRY(const auto atlas, packForFile(joined.bundle, settings, o.output, save, program.job));
+    STX_TRY(const auto atlas,
+            packForFile(*viewsOf(joined.bundle), settings, o.output, save, program.job));
     STX_CHECK(program.job.checkCancelled());
     STX_CHECK(writeAtlas(atlas, o.output, program.job, save));
     const double seconds = watch.seconds();
@@ -337,7 +375,7 @@ Result<int> packInput(const PackOptions& options, Program& program) {
                         "a numbered name for one atlas each, as in -o 'atlas_%04d'",
                         o.input, count);
         STX_TRY(const auto moment, momentOf(o.time, timeline, nullptr, o.input, program.job));
-        return packBundle(o, frames->frame(moment, program.job), nullptr, program);
+        return packMoment(o, *frames, moment, program);
     }
     if (!program.common.report.empty() && count > 1)
         return fail(ErrorCode::usage,

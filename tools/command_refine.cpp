@@ -11,7 +11,6 @@
 #include "lib/refine/poses.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "lib/registration/disagreement.hpp"
-#include "lib/render/factory.hpp"
 #include "tools/commands.hpp"
 #include "tools/refining.hpp"
 
@@ -67,10 +66,9 @@ Result<std::unique_ptr<ViewTable>> exactViews(const RefineOptions& o,
     return table;
 }
 
-/// With summaries where nothing is left to do of the views: not all need be there for a picture.
+/// Where nothing is left to do of the views, as is after all usual steps, that need not be found.
 Result<void> saveStill(const ViewTable& table, const RefineOptions& o, SaveOptions save, Job& job) {
-    if (stepsOf(o) == "auto" && tellWithoutPixels(table.about().views))
-        save.summarise = summaryOfView;
+    if (stepsOf(o) == "auto") save.summaries = SaveOptions::Summaries::known;
     return saveViews(table, o.output, save, job);
 }
 

@@ -99,14 +99,18 @@ Result<Bundle> readViews(const RenderOptions& o, const PeakMemory& drawing, cons
     return someViews(table, wanted, spool.get(), job, look);
 }
 
-/// Whether the views of a table may be chosen by the pictures that are wanted: summaries tell of
-/// them, and nothing looks at all of them first.
-bool mayChoose(const RenderOptions& o, const RenderSettings& settings, const ViewTable& table) {
-    const bool refines = std::ranges::any_of(refineSteps(), [&](const RefineStepInfo& info) {
-        return settings.refine.of(info.step) == RefineSwitch::on;
-    });
-    return !o.around && !(o.camera.swayPercent > 0) && !refines && table.about().bounds &&
-           !table.summaries().empty() && tellWithoutPixels(table.about().views);
+/// Whether summaries say that refining would find nothing to do, and no step is asked for.
+bool isExact(const RenderSettings& settings, const ViewTable& table) {
+    return !table.summaries().empty() && tellWithoutPixels(table.about().views) &&
+           std::ranges::none_of(refineSteps(), [&](const RefineStepInfo& info) {
+               return settings.refine.of(info.step) == RefineSwitch::on;
+           });
+}
+
+/// Whether the views of a table that is exact may be chosen by the pictures that are wanted:
+/// nothing looks at all of them first.
+bool mayChoose(const RenderOptions& o, const ViewTable& table) {
+    return !o.around && !(o.camera.swayPercent > 0) && table.about().bounds;
 }
 
 /// Opens what stands still. Views that would take more memory than there may be go into a spool,
@@ -120,7 +124,8 @@ Result<void> openStill(const RenderOptions& o, const RenderSettings& settings, D
     }
     STX_TRY(auto opened, openMeshOrViews(o.input, o.open, job));
     auto& table = std::get<std::unique_ptr<ViewTable>>(opened);
-    if (mayChoose(o, settings, *table)) {
+    scene.exact = isExact(settings, *table);
+    if (scene.exact && mayChoose(o, *table)) {
         STX_TRY(scene.model,
                 someViews(*table, std::vector<bool>(table->count(), false), nullptr, job));
         scene.table = std::move(table);
@@ -192,8 +197,10 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
     return scene;
 }
 
-Result<void> makeStill(const RenderOptions& o, const RenderSettings& settings,
+Result<void> makeStill(const RenderOptions& o, const RenderSettings& asked,
                        const std::vector<NovelCamera>& pictures, DrawnScene& scene, Job& job) {
+    RenderSettings settings = asked;
+    if (scene.exact) settings.refine = RefineSettings::none();
     if (scene.table) {
         std::vector<Camera> cameras;
         const auto part = o.shard.rangeOf(pictures.size());

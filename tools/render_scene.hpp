@@ -53,6 +53,7 @@ struct DrawnScene {
     /// is a bundle of their headers. See makeStill().
     std::unique_ptr<ViewTable> table;
     std::vector<ViewSummary> summaries;  ///< of its views, where not all of them are read
+    bool exact = false;                  ///< the file has summaries: there is nothing to refine
     std::unique_ptr<Renderer> still;
     std::unique_ptr<MovingPictures> moving;
     CameraContext context;

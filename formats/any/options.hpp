@@ -1,15 +1,11 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <string>
 
 #include "formats/imagesets/image_sets.hpp"
 
 namespace stx {
-
-struct ReferenceView;
-struct ViewSummary;
 
 struct OpenOptions {
     std::string texture;     ///< texture of a mesh, in place of those that it names; empty = none
@@ -33,9 +29,15 @@ struct OpenOptions {
 
 struct SaveOptions {
     bool noClobber = false;  ///< error (io) when the target exists
-    /// OpenEXR: gives what is kept of each view for those who draw without its pixels
-    /// (ViewTable::summaries()), from any thread; null: nothing is.
-    std::function<ViewSummary(const ReferenceView& view)> summarise = nullptr;
+    /// OpenEXR: what is known of each view, kept for those who draw without its pixels
+    /// (ViewTable::summaries()). A file of exact views has it, where each may be left out.
+    enum class Summaries {
+        none,
+        /// Of views that come from a file with summaries, and of those in which refine() would
+        /// change nothing: they are read up to three times more for that.
+        ofExact,
+        known,  ///< the views are exact, as those of a mesh are: they are not looked at for it
+    } summaries = Summaries::ofExact;
     int jpegQuality = 0;  ///< 0 = PNG, exact; 1..100 = colour as JPEG (MPEG-4, atlas folders)
     /// MPEG-4 films: pictures that change as H.264 video, colour of this quality (0 best, 51
     /// worst), depth lossless in 8 or 10 bits; -1: as PNG or JPEG pictures.

@@ -1,14 +1,47 @@
 #include "formats/any/save.hpp"
 
 #include <algorithm>
+#include <functional>
 
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
-#include "lib/model/view_summary.hpp"
+#include "lib/refine/refine_needed.hpp"
+#include "lib/render/factory.hpp"
 
 namespace stx {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+using Summarise = std::function<ViewSummary(const ReferenceView& view)>;
+
+/// Whether one view and what making its summary takes are within the limit.
+bool hasRoomForSummaries(const ViewTable& table, const Limits& limits) {
+    std::uint64_t most = 0;
+    for (std::size_t i = 0; i < table.count(); ++i)
+        most = std::max({most, table.bytesToMake(i),
+                         table.bytesGiven(i) + peak::kSummary.perPixel * table.pixelsOf(i)});
+    return table.bytesHeld() + most <= limits.maxMemoryBytes;
+}
+
+/// What makes the summaries of views, none where they would tell nothing: see SaveOptions. Errors:
+/// cancelled.
+Result<Summarise> summariesFor(const ViewTable& table, SaveOptions::Summaries wanted, Job& job) {
+    if (wanted == SaveOptions::Summaries::none || !tellWithoutPixels(table.about().views))
+        return Summarise();
+    // Next to a limit of the memory a file without summaries is better than none.
+    if (!hasRoomForSummaries(table, job.limits)) return Summarise();
+    if (wanted == SaveOptions::Summaries::ofExact && table.summaries().empty()) {
+        const auto needed = mayRefine(table, RefineSettings(), job);
+        STX_CHECK(job.checkCancelled());
+        // What is wrong with a view shows when it is written.
+        if (!needed || *needed) return Summarise();
+    }
+    return Summarise(summaryOfView);
+}
+
+}  // namespace
 
 Result<FileKind> containerOf(const fs::path& target) {
     std::string ending = target.extension().string();
@@ -33,8 +66,10 @@ Result<void> saveViews(const ViewTable& table, const fs::path& target, const Sav
     if (container == FileKind::exr && options.octreeLevels > 0)
         return fail(ErrorCode::usage, "'{}': an OctreeImage is written as .mp4, .xmt or .bt only",
                     target.string());
-    if (container == FileKind::exr)
-        return writeExrViews(table, target, job, {options.noClobber}, options.summarise);
+    if (container == FileKind::exr) {
+        STX_TRY(const auto summarise, summariesFor(table, options.summaries, job));
+        return writeExrViews(table, target, job, {options.noClobber}, summarise);
+    }
     return writeMpeg4Views(table, target, job, mpeg4Scene(options), mpeg4Write(options));
 }
 

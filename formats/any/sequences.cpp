@@ -226,13 +226,16 @@ Result<void> saveSequence(Sequence& frames, const fs::path& target, const SaveOp
                     "as in name_%04d.exr hold more",
                     target.string(), count);
     if (isNumberedExr(target)) {
+        // Frames are drawn one after the other, each whole.
+        SaveOptions each = options;
+        each.summaries = SaveOptions::Summaries::none;
         for (std::size_t i = 0; i < count; ++i) {
             job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(count),
                          "writing frames");
             STX_CHECK(job.checkCancelled());
             STX_TRY(const auto table, frames.views(i, job));
             STX_CHECK(
-                saveViews(*table, *frameName(target.string(), static_cast<int>(i)), options, job));
+                saveViews(*table, *frameName(target.string(), static_cast<int>(i)), each, job));
         }
         return {};
     }

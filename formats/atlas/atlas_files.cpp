@@ -1,6 +1,7 @@
 #include "formats/atlas/atlas_files.hpp"
 
 #include <algorithm>
+#include <functional>
 
 #include "formats/atlas/atlas_floats.hpp"
 #include "formats/atlas/atlas_json.hpp"
@@ -112,7 +113,11 @@ Result<Bytes> encodeDepth(const Image<std::uint16_t>& codes, const AtlasTexture&
     return encodePng(t.width, t.height, 1, 8, bytes.data(), false);
 }
 
-Result<Bytes> encodeImage(const Atlas& atlas, const AtlasTexture& t, int jpegQuality, Job& job) {
+/// Called with the number of a page whose depth is not looked at any more.
+using DepthIsCoded = std::function<void(int page)>;
+
+Result<Bytes> encodeImage(const Atlas& atlas, const AtlasTexture& t, int jpegQuality,
+                          const DepthIsCoded& depthIsCoded, Job& job) {
     const AtlasPage& page = atlas.pages[t.page];
     if (t.coding == kOpaque)
         return encodeJpeg(t.width, t.height, 3, opaqueBytes(page.texture).data(), jpegQuality);
@@ -123,6 +128,7 @@ Result<Bytes> encodeImage(const Atlas& atlas, const AtlasTexture& t, int jpegQua
         if (coded.outside) job.note("depth outside of all rectangles was dropped from the atlas");
         if (coded.clamped)
             job.note("depth beyond nearPlane or farPlane was clamped to them in the atlas");
+        if (depthIsCoded) depthIsCoded(t.page);
         return encodeDepth(coded.codes, t, page.texture);
     }
     if (t.attribute == "metallic_roughness")
@@ -154,7 +160,7 @@ Result<void> checkJpeg(const AtlasHeader& header, const fs::path& path) {
 }
 
 Result<void> writeFolder(const Atlas& atlas, const fs::path& path, Job& job,
-                         const AtlasSaveOptions& options) {
+                         const AtlasSaveOptions& options, const DepthIsCoded& depthIsCoded) {
     const AtlasHeader header = headerOf(atlas, false, options.jpegQuality > 0);
     if (options.jpegQuality > 0) STX_CHECK(checkJpeg(header, path));
     STX_TRY(auto folder, OutputFolder::create(path, options.output, ownNames()));
@@ -167,7 +173,7 @@ Result<void> writeFolder(const Atlas& atlas, const fs::path& path, Job& job,
             done[i] = writeFloatImage(header, atlas.pages[t.page], t, file);
             return;
         }
-        const auto bytes = encodeImage(atlas, t, options.jpegQuality, job);
+        const auto bytes = encodeImage(atlas, t, options.jpegQuality, depthIsCoded, job);
         done[i] = bytes ? writeFile(file, *bytes) : Result<void>(tl::unexpected(bytes.error()));
     });
     for (auto& result : done) {
@@ -442,14 +448,30 @@ double AtlasHeader::used() const {
            (static_cast<double>(pageWidth) * pageHeight * pages);
 }
 
-Result<void> writeAtlas(const Atlas& atlas, const fs::path& path, Job& job,
-                        const AtlasSaveOptions& options) {
+namespace {
+
+Result<void> writeAny(const Atlas& atlas, const fs::path& path, Job& job,
+                      const AtlasSaveOptions& options, const DepthIsCoded& depthIsCoded) {
     STX_CHECK(atlas.check());
-    if (!isExrName(path)) return writeFolder(atlas, path, job, options);
+    if (!isExrName(path)) return writeFolder(atlas, path, job, options, depthIsCoded);
     if (options.jpegQuality > 0)
         return failAt(fmt::format("'{}'", path.string()), ErrorCode::unsupported,
                       "an OpenEXR atlas holds no JPEG; name a folder instead of an .exr file");
     return writeExr(atlas, path, job, options.output);
+}
+
+}  // namespace
+
+Result<void> writeAtlas(const Atlas& atlas, const fs::path& path, Job& job,
+                        const AtlasSaveOptions& options) {
+    return writeAny(atlas, path, job, options, {});
+}
+
+Result<void> writeAtlas(Atlas&& atlas, const fs::path& path, Job& job,
+                        const AtlasSaveOptions& options) {
+    Atlas own = std::move(atlas);
+    return writeAny(own, path, job, options,
+                    [&own](int page) { own.pages[static_cast<std::size_t>(page)].depth = {}; });
 }
 
 int largestImageSide(const Atlas& atlas, const fs::path& path, const AtlasSaveOptions& options) {

@@ -78,6 +78,9 @@ struct AtlasSaveOptions {
 /// Atlas::check(); files; unsupported: JPEG where OpenEXR is needed.
 [[nodiscard]] Result<void> writeAtlas(const Atlas& atlas, const std::filesystem::path& path,
                                       Job& job, const AtlasSaveOptions& options = {});
+/// The same bytes; depth takes no memory any more once it is coded.
+[[nodiscard]] Result<void> writeAtlas(Atlas&& atlas, const std::filesystem::path& path, Job& job,
+                                      const AtlasSaveOptions& options = {});
 
 /// Longest side of the images that writeAtlas() makes of an atlas that passes check(), pixels:
 /// where an image holds two pictures of a page (AtlasTexture::secondX), it is larger than the page.

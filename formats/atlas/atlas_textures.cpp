@@ -11,31 +11,21 @@ namespace stx {
 
 namespace {
 
-/// Calls visit(rectangle, x0, y0, x1, y1) for each rectangle of the page: first all with their
-/// padding, then all without, so that a rectangle's own pixels are always its own.
-template <class Visit>
-void forEachArea(const Atlas& atlas, int page, const Visit& visit) {
-    for (const bool padded : {true, false}) {
-        const int around = padded ? atlas.padding : 0;
-        if (padded && around == 0) continue;
-        for (const auto& r : atlas.rectangles) {
-            if (r.page != page) continue;
-            visit(r, std::max(0, r.atlasX - around), std::max(0, r.atlasY - around),
-                  r.atlasX + r.atlasWidth() + around, r.atlasY + r.atlasHeight() + around);
+/// Which view each pixel of a row of a page belongs to, -1 = none: first by all rectangles with
+/// their padding, then by all without, so that a rectangle's own pixels are always its own, and
+/// overlapping paddings are settled alike on both ways. Row by row, since a whole page of numbers
+/// is as large as its colours.
+std::vector<std::int32_t> ownersOfRow(const Atlas& atlas, int page, int y, int width) {
+    std::vector<std::int32_t> owner(static_cast<std::size_t>(width), -1);
+    for (const int around : {atlas.padding, 0}) {
+        for (const AtlasRectangle& r : atlas.rectangles) {
+            if (r.page != page || y < r.atlasY - around || y >= r.atlasY + r.atlasHeight() + around)
+                continue;
+            const int first = std::max(0, r.atlasX - around);
+            const int end = std::min(width, r.atlasX + r.atlasWidth() + around);
+            std::fill(owner.begin() + first, owner.begin() + std::max(first, end), r.view);
         }
     }
-}
-
-/// The same in an order of rows, so that overlapping paddings are settled alike on both ways:
-/// which view each pixel belongs to, -1 = none.
-Image<std::int32_t> owners(const Atlas& atlas, int page, glm::ivec2 size) {
-    Image<std::int32_t> owner(size.x, size.y, -1);
-    forEachArea(atlas, page, [&](const AtlasRectangle& r, int x0, int y0, int x1, int y1) {
-        for (int y = y0; y < std::min(y1, size.y); ++y) {
-            const auto row = owner.row(y);
-            std::fill(row.begin() + x0, row.begin() + std::min(x1, size.x), r.view);
-        }
-    });
     return owner;
 }
 
@@ -43,16 +33,16 @@ Image<std::int32_t> owners(const Atlas& atlas, int page, glm::ivec2 size) {
 
 DepthCodes depthCodes(const Atlas& atlas, int page) {
     const Image<float>& depth = atlas.pages[page].depth;
-    const auto owner = owners(atlas, page, depth.size());
     DepthCodes result;
     result.codes = Image<std::uint16_t>(depth.width(), depth.height());
     std::atomic<std::int64_t> outside = 0, clamped = 0;
     parallelFor(0, depth.height(), [&](std::int64_t row) {
+        const auto owner = ownersOfRow(atlas, page, static_cast<int>(row), depth.width());
         std::int64_t lost = 0, moved = 0;
         for (int x = 0, y = static_cast<int>(row); x < depth.width(); ++x) {
             const float d = depth.at(x, y);
             if (!hasPoint(d)) continue;
-            const int view = owner.at(x, y);
+            const int view = owner[static_cast<std::size_t>(x)];
             if (view < 0) {
                 ++lost;
                 continue;
@@ -72,13 +62,13 @@ DepthCodes depthCodes(const Atlas& atlas, int page) {
 
 Result<Image<float>> depthFromCodes(const Atlas& atlas, int page,
                                     const Image<std::uint16_t>& codes) {
-    const auto owner = owners(atlas, page, codes.size());
     Image<float> depth(codes.width(), codes.height(), kNoDepth);
     std::atomic<bool> tooLarge = false;
     parallelFor(0, codes.height(), [&](std::int64_t row) {
+        const auto owner = ownersOfRow(atlas, page, static_cast<int>(row), codes.width());
         for (int x = 0, y = static_cast<int>(row); x < codes.width(); ++x) {
             const std::uint32_t d = codes.at(x, y);
-            const int view = owner.at(x, y);
+            const int view = owner[static_cast<std::size_t>(x)];
             if (d == 0 || view < 0) continue;
             const DepthCode code = atlas.views[view].depthCode();
             if (d > code.dmax) tooLarge = true;

@@ -207,7 +207,8 @@ Result<bool> writeViews(const ViewTable& table, bool hasPoints, const Summarise&
                      "writing views");
         return {};
     };
-    STX_CHECK(forEachView(table, {"writing OpenEXR", 0}, job, keep, write));
+    STX_CHECK(forEachView(table, {"writing OpenEXR", summarise ? peak::kSummary.perPixel : 0}, job,
+                          keep, write));
     for (const Bounds& one : each) {
         if (one.empty()) continue;
         bounds.add(one.min);

@@ -44,6 +44,7 @@ inline constexpr PeakMemory kSheet = {"the sheet", 0, 12};
 inline constexpr PeakMemory kSheetOfTwo = {"the sheet of two", 34};
 inline constexpr PeakMemory kSplatMode = {"drawing splats", 8};
 inline constexpr PeakMemory kSplats = {"splats", 118};
+inline constexpr PeakMemory kSummary = {"summaries of views", 24};
 inline constexpr PeakMemory kSurfaceMode = {"drawing", 14};
 inline constexpr PeakMemory kSurfaces = {"surfaces", 76, 94};
 // Where the memory of a device is that of the process.

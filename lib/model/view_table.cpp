@@ -89,6 +89,9 @@ class ChangedViews : public ViewTable {
         return std::max(table_->bytesToMake(index),
                         table_->bytesOf(index) + each * pixelsOf(index));
     }
+    std::vector<ViewSummary> summaries() const override {
+        return change_.keepsPixels ? table_->summaries() : std::vector<ViewSummary>();
+    }
     std::string where() const override { return table_->where(); }
     int mostAtOnce() const override { return table_->mostAtOnce(); }
 
@@ -120,6 +123,7 @@ class WatchedViews : public ViewTable {
     std::uint64_t bytesToMake(std::size_t index) const override {
         return table_->bytesToMake(index);
     }
+    std::vector<ViewSummary> summaries() const override { return table_->summaries(); }
     std::string where() const override { return table_->where(); }
     int mostAtOnce() const override { return table_->mostAtOnce(); }
 

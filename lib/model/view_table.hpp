@@ -126,6 +126,8 @@ struct ViewChange {
     std::function<void(ViewImageKinds& kinds)> kinds;
     /// What it takes beside the view, with what it adds.
     PeakMemory takes;
+    /// Colours and depth stay, too: what is kept of the views (ViewTable::summaries()) stays true.
+    bool keepsPixels = false;
 };
 /// The same views, each changed when it is asked for.
 [[nodiscard]] std::unique_ptr<ViewTable> changedViews(std::unique_ptr<ViewTable> table,

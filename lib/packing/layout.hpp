@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "lib/model/view_table.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/rectangles.hpp"
 
@@ -15,7 +16,7 @@ struct AtlasLayout {
 };
 
 /// Points, and pixels of full alpha without a distance.
-[[nodiscard]] std::int64_t objectPixels(const Bundle& bundle);
+[[nodiscard]] std::int64_t objectPixels(const ReferenceView& view);
 
 /// The least power of two that is not below, of 1 .. 2^30.
 [[nodiscard]] int powerOfTwoFrom(int size);
@@ -30,8 +31,9 @@ struct AtlasLayout {
 [[nodiscard]] Result<AtlasLayout> gridLayout(const Bundle& bundle, const PackSettings& settings,
                                              int maxPages);
 
-/// Content only, see PackSettings::Layout::tight. Views without content get no rectangle.
-[[nodiscard]] Result<AtlasLayout> tightLayout(const Bundle& bundle, const PackSettings& settings,
-                                              int maxPages);
+/// Content only, see PackSettings::Layout::tight. Views without content get no rectangle. Errors:
+/// also those of the views.
+[[nodiscard]] Result<AtlasLayout> tightLayout(const ViewTable& table, const PackSettings& settings,
+                                              int maxPages, Job& job);
 
 }  // namespace stx

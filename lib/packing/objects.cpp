@@ -37,6 +37,12 @@ Result<void> checkPackObjects(const std::vector<PackObject>& objects) {
     return {};
 }
 
+std::int64_t pixelsOf(const Bundle& bundle) {
+    std::int64_t n = 0;
+    for (const ReferenceView& view : bundle.views) n += objectPixels(view);
+    return n;
+}
+
 }  // namespace
 
 Result<JoinedObjects> joinObjects(std::vector<PackObject> objects, Job& job) {
@@ -52,7 +58,7 @@ Result<JoinedObjects> joinObjects(std::vector<PackObject> objects, Job& job) {
         entry.bounds = o.bundle.bounds;
         entry.origin = o.bundle.origin;
         entry.keptPixels = o.bundle.pointCount();
-        entry.sourcePixels = o.sourcePixels > 0 ? o.sourcePixels : objectPixels(o.bundle);
+        entry.sourcePixels = o.sourcePixels > 0 ? o.sourcePixels : pixelsOf(o.bundle);
         if (o.bundle.environment) environments.push_back(o.name);
         std::ranges::move(o.bundle.views, std::back_inserter(joined.bundle.views));
         o.bundle = {};

@@ -1,9 +1,11 @@
 #include "lib/packing/packing.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 #include "lib/base/parallel.hpp"
 #include "lib/packing/layout.hpp"
+#include "lib/packing/views_one_by_one.hpp"
 
 namespace stx {
 namespace {
@@ -20,14 +22,14 @@ struct Contents {
     }
 };
 
-Contents contentsOf(const Bundle& bundle) {
+Contents contentsOf(const std::vector<ViewImageKinds>& views) {
     Contents c;
-    c.linear = !bundle.views.empty() && bundle.views[0].texture.isLinear();
-    for (const auto& v : bundle.views) {
-        c.normals = c.normals || v.hasNormals();
+    c.linear = !views.empty() && views[0].linear;
+    for (const ViewImageKinds& v : views) {
+        c.normals = c.normals || v.normal;
         c.splats = c.splats || v.hasSplats();
-        c.metallicRoughness = c.metallicRoughness || !v.metallicRoughness.empty();
-        c.emissive = c.emissive || !v.emissive.empty();
+        c.metallicRoughness = c.metallicRoughness || v.metallicRoughness;
+        c.emissive = c.emissive || v.emissive;
     }
     return c;
 }
@@ -160,18 +162,18 @@ void dropIfZero(Image<T>& image) {
 
 }  // namespace
 
-std::int64_t objectPixels(const Bundle& bundle) {
+std::int64_t objectPixels(const ReferenceView& view) {
     std::int64_t n = 0;
-    for (const auto& view : bundle.views) {
-        for (int y = 0; y < view.depth.height(); ++y) {
-            for (int x = 0; x < view.depth.width(); ++x)
-                n += hasPoint(view.depth.at(x, y)) || view.texture.at(x, y).a >= 1.0f ? 1 : 0;
-        }
+    for (int y = 0; y < view.depth.height(); ++y) {
+        for (int x = 0; x < view.depth.width(); ++x)
+            n += hasPoint(view.depth.at(x, y)) || view.texture.at(x, y).a >= 1.0f ? 1 : 0;
     }
     return n;
 }
 
-Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job) {
+namespace {
+
+Result<void> checkSettings(const ViewTable& table, const PackSettings& settings) {
     if (settings.padding < 0 || settings.padding > 64)
         return fail(ErrorCode::usage, "the padding is {} pixels; 0 to 64 is possible",
                     settings.padding);
@@ -183,31 +185,38 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
         (size.x < 1 || size.y < 1 || std::max(size.x, size.y) > settings.maxSize))
         return fail(ErrorCode::usage, "textures of {}x{} are asked for; 1 to {} is possible",
                     size.x, size.y, settings.maxSize);
-    STX_CHECK(bundle.check());
-    if (settings.objects) STX_CHECK(checkObjects(*settings.objects, bundle.views.size()));
-    const Bundle& content = settings.contentOf ? *settings.contentOf : bundle;
-    bool alike = content.views.size() == bundle.views.size();
-    for (std::size_t i = 0; alike && i < content.views.size(); ++i)
-        alike = content.views[i].depth.size() == bundle.views[i].depth.size();
+    if (table.whole()) STX_CHECK(table.about().check());
+    if (settings.objects) STX_CHECK(checkObjects(*settings.objects, table.count()));
+    if (!settings.contentOf) return {};
+    const std::vector<ReferenceView>& content = settings.contentOf->views;
+    bool alike = content.size() == table.count();
+    for (std::size_t i = 0; alike && i < content.size(); ++i) {
+        const Camera& camera = table.about().views[i].camera;
+        alike = content[i].depth.size() == glm::ivec2(camera.width, camera.height);
+    }
     if (!alike)
         return fail(ErrorCode::usage,
                     "the {} views are not those of the frames that they are packed like",
-                    bundle.views.size());
-    const Contents contents = contentsOf(bundle);
-    const int maxPages = 4 / contents.texturesPerPage();
-    const bool tight = settings.layout == PackSettings::Layout::tight;
-    STX_TRY(AtlasLayout layout, tight ? tightLayout(content, settings, maxPages)
-                                      : gridLayout(bundle, settings, maxPages));
-    if (layout.rectangles.empty())
-        return fail(ErrorCode::invalidInput, "none of the {} views has a point to pack",
-                    bundle.views.size());
-    // The views, their pages, and a page while its picture is packed.
-    STX_CHECK(job.limits.checkAllocation(
-        static_cast<std::uint64_t>(layout.width) * layout.height * layout.pages,
-        2 * contents.bytesPerPixel() + 24, "an atlas"));
+                    table.count());
+    return {};
+}
 
+/// Where all goes; pixels are looked at for it in the tight layout.
+Result<AtlasLayout> layoutOf(const ViewTable& table, const PackSettings& settings, int maxPages,
+                             Job& job) {
+    if (settings.layout == PackSettings::Layout::grid)
+        return gridLayout(table.about(), settings, maxPages);
+    if (settings.contentOf)
+        return tightLayout(*viewsOf(*settings.contentOf), settings, maxPages, job);
+    return tightLayout(table, settings, maxPages, job);
+}
+
+/// An atlas of empty pages.
+Atlas emptyAtlas(const ViewTable& table, const AtlasLayout& layout, const Contents& contents,
+                 const PackSettings& settings) {
+    const Bundle& bundle = table.about();
     Atlas atlas;
-    atlas.layout = tight ? "tight" : "grid";
+    atlas.layout = settings.layout == PackSettings::Layout::tight ? "tight" : "grid";
     atlas.padding = settings.padding;
     atlas.bounds = bundle.bounds;
     atlas.origin = bundle.origin;
@@ -215,10 +224,6 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     atlas.title = bundle.title;
     atlas.time = bundle.time;
     atlas.duration = bundle.duration;
-    const std::vector<int> source = keptViews(bundle, tight, layout.rectangles, job);
-    if (settings.objects) atlas.objects = keptObjects(*settings.objects, source);
-    for (const int i : source) atlas.views.push_back(withoutImages(bundle.views[i]));
-    atlas.rectangles = std::move(layout.rectangles);
     for (int i = 0; i < layout.pages; ++i) {
         AtlasPage page;
         page.texture = emptyTexture(layout.width, layout.height, contents.linear);
@@ -226,19 +231,55 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
         makeFurther(contents, layout.width, layout.height, page);
         atlas.pages.push_back(std::move(page));
     }
+    return atlas;
+}
+
+}  // namespace
+
+Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& job) {
+    STX_CHECK(checkSettings(table, settings));
+    const std::size_t count = table.count();
+    const Contents contents = contentsOf(table.kinds());
+    STX_TRY(AtlasLayout layout, layoutOf(table, settings, 4 / contents.texturesPerPage(), job));
+    if (layout.rectangles.empty())
+        return fail(ErrorCode::invalidInput, "none of the {} views has a point to pack", count);
+    // The pages, a page while its picture is packed, and views that are in memory.
+    STX_CHECK(job.limits.checkAllocation(
+        static_cast<std::uint64_t>(layout.width) * layout.height * layout.pages,
+        (table.whole() ? 2 : 1) * contents.bytesPerPixel() + 24, "an atlas"));
+    Atlas atlas = emptyAtlas(table, layout, contents, settings);
+    const bool tight = settings.layout == PackSettings::Layout::tight;
+    const std::vector<int> source = keptViews(table.about(), tight, layout.rectangles, job);
+    if (settings.objects) atlas.objects = keptObjects(*settings.objects, source);
+    for (const int i : source) atlas.views.push_back(withoutImages(table.about().views[i]));
+    atlas.rectangles = std::move(layout.rectangles);
     STX_CHECK(job.checkCancelled());
-    parallelFor(0, static_cast<std::int64_t>(atlas.rectangles.size()), [&](std::int64_t i) {
-        const auto& r = atlas.rectangles[i];
-        fillPage(bundle.views[source[r.view]], r, settings.padding, atlas.pages[r.page]);
-    });
-    atlas.sourcePixels = objectPixels(bundle);
+    std::vector<std::vector<const AtlasRectangle*>> ofView(count);
+    for (const AtlasRectangle& r : atlas.rectangles) ofView[source[r.view]].push_back(&r);
+    std::vector<std::int64_t> object(count), points(count);
+    STX_CHECK(forEachView(
+        table, {"an atlas", 0}, job,
+        [&](std::size_t i, const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
+            parallelFor(0, static_cast<std::int64_t>(ofView[i].size()), [&](std::int64_t k) {
+                const AtlasRectangle& r = *ofView[i][static_cast<std::size_t>(k)];
+                fillPage(*view, r, settings.padding, atlas.pages[r.page]);
+            });
+            object[i] = objectPixels(*view);
+            points[i] = view->pointCount();
+            return {};
+        }));
+    atlas.sourcePixels = std::reduce(object.begin(), object.end());
     if (settings.sourcePixels > 0) atlas.sourcePixels = settings.sourcePixels;
     if (settings.objects) {
         atlas.sourcePixels = 0;
         for (const auto& o : atlas.objects) atlas.sourcePixels += o.sourcePixels;
     }
-    atlas.keptPixels = bundle.pointCount();
+    atlas.keptPixels = std::reduce(points.begin(), points.end());
     return atlas;
+}
+
+Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job) {
+    return pack(*viewsOf(bundle), settings, job);
 }
 
 std::vector<std::uint64_t> outsideBits(const Atlas& atlas, std::size_t of) {

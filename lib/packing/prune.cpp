@@ -4,33 +4,55 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <utility>
 
 #include "lib/base/parallel.hpp"
 #include "lib/packing/redundancy.hpp"
+#include "lib/packing/views_one_by_one.hpp"
 #include "lib/selection/coverage.hpp"
 
 namespace stx {
 namespace {
 
-/// Side of the squares that a budget left over gives back, pixels.
+/// Side of the squares that are looked at together, and that a budget left over gives back, pixels.
 constexpr int kBlock = 16;
 /// Pruned pixels keep their colour this near to kept ones.
 constexpr int kColourBand = 4;
 /// Background pixels this near to pruned ones, and not beside kept ones, are untold as well.
 constexpr int kSilhouetteBand = 2;
 
-/// Views by what each adds to the coverage; empty ones last.
-std::vector<int> rankViews(const Bundle& bundle, const std::vector<DepthSurface>& surfaces) {
-    const auto views = static_cast<std::int64_t>(bundle.views.size());
-    const auto count =
-        static_cast<int>(std::clamp<std::int64_t>(20'000'000 / (views * views + 1), 200, 8000));
-    std::vector<CandidateView> candidates;
-    for (const auto& v : bundle.views)
-        candidates.push_back(
-            {v.camera, v.camera, &v.depth, v.depthBits == 32 ? 0.0 : v.depthCode().step()});
-    const auto problem = coverProblem(sampleBundle(bundle, count, surfaces), candidates, 0);
+/// What forEachView() may take to prepare a view beside it: its surface and room for its points,
+/// and what is kept of both; see PruneView.
+constexpr PeakMemory kPreparing = {"pruning", 40};
+
+/// Views by what each adds to the coverage; empty ones last. `points`: of all views.
+std::vector<int> rankViews(const std::vector<PruneView>& prepared, std::int64_t points) {
+    const auto views = static_cast<std::int64_t>(prepared.size());
+    const auto count = std::clamp<std::int64_t>(20'000'000 / (views * views + 1), 200, 8000);
+    const std::int64_t stride = std::max<std::int64_t>(1, points / count);
+    std::vector<ViewSamples> ofViews(prepared.size());
+    parallelFor(0, views, [&](std::int64_t i) {
+        const PruneView& p = prepared[i];
+        ReferenceView view;
+        view.camera = p.camera;
+        view.depth = p.depth();
+        ofViews[i] = samplesOfView(view, static_cast<std::size_t>(i), stride, [&p](int x, int y) {
+            const PruneView::Surfel& s = p.surfel(x, y);
+            return std::pair(s.w, s.gradient);
+        });
+    });
+    std::vector<std::vector<Sighting>> seen(prepared.size());
+    parallelFor(0, views, [&](std::int64_t i) {
+        const PruneView& p = prepared[i];
+        const Image<float> depth = p.depth();
+        const CandidateView candidate{p.camera, p.camera, &depth, p.codeStep};
+        for (const ViewSamples& of : ofViews)
+            for (const SurfaceSample& s : of.samples) seen[i].push_back(sightingOf(candidate, s));
+    });
+    const auto problem = coverProblem(setAreas(ofViews, seen, stride), seen, 0);
     std::vector<int> rank = chooseCover(problem, static_cast<int>(views), 1.0).chosen;
-    std::vector<bool> ranked(bundle.views.size(), false);
+    std::vector<bool> ranked(prepared.size(), false);
     for (const int v : rank) ranked[v] = true;
     for (int v = 0; v < views; ++v) {
         if (!ranked[v]) rank.push_back(v);
@@ -44,6 +66,30 @@ std::int64_t countKept(const std::vector<PruneView>& views) {
     return n;
 }
 
+/// Gives away what others show of a block; `next` is what is kept of the view after it.
+void giveAwayBlock(std::vector<PruneView>& views, PruneView& from, const PruneBlock& block,
+                   const PruneSettings& settings, Image<std::uint8_t>& next) {
+    const std::vector<int> partners = partnersOfBlock(views, from, block);
+    if (partners.empty()) return;
+    for (int y = block.y0; y < block.y1; ++y) {
+        for (int x = block.x0; x < block.x1; ++x) {
+            if (!from.kept.at(x, y) || from.locked[from.places.at(x, y)]) continue;
+            const PrunePixel pixel(from, x, y);
+            for (const int j : partners) {
+                PruneView& to = views[j];
+                const Replacement r = findReplacement(from, pixel, to, settings);
+                if (!r.found) continue;
+                for (int c = 0; c < 4; ++c)
+                    std::atomic_ref(to.locked[to.places.at(r.x + (c & 1), r.y + (c >> 1))])
+                        .store(1, std::memory_order_relaxed);
+                next.at(x, y) = 0;
+                from.errors[from.places.at(x, y)] = static_cast<float>(r.error);
+                break;
+            }
+        }
+    }
+}
+
 /// Views from the lowest rank up give away what others show. Locks hold what replaced something.
 void giveAway(std::vector<PruneView>& views, const std::vector<int>& rank,
               const PruneSettings& settings) {
@@ -51,26 +97,16 @@ void giveAway(std::vector<PruneView>& views, const std::vector<int>& rank,
         PruneView& from = views[*k];
         if (from.partners.empty()) continue;
         Image<std::uint8_t> next = from.kept;
-        parallelForBlocks(0, from.kept.height(), 8, [&](std::int64_t begin, std::int64_t end) {
-            for (int y = static_cast<int>(begin); y < end; ++y) {
-                for (int x = 0; x < from.kept.width(); ++x) {
-                    if (!from.kept.at(x, y) || from.locked.at(x, y)) continue;
-                    const PrunePixel pixel(from, x, y);
-                    for (const int j : from.partners) {
-                        PruneView& to = views[j];
-                        const Replacement r = findReplacement(from, pixel, to, settings);
-                        if (!r.found) continue;
-                        for (int c = 0; c < 4; ++c)
-                            std::atomic_ref(to.locked.at(r.x + (c & 1), r.y + (c >> 1)))
-                                .store(1, std::memory_order_relaxed);
-                        next.at(x, y) = 0;
-                        from.error.at(x, y) = static_cast<float>(r.error);
-                        break;
-                    }
-                }
-            }
+        const int width = next.width(), height = next.height();
+        parallelFor(0, (height + kBlock - 1) / kBlock, [&](std::int64_t row) {
+            const int y = static_cast<int>(row) * kBlock;
+            for (int x = 0; x < width; x += kBlock)
+                giveAwayBlock(views, from,
+                              {x, y, std::min(x + kBlock, width), std::min(y + kBlock, height)},
+                              settings, next);
         });
         from.kept = std::move(next);
+        from.findLiveBlocks();
     }
 }
 
@@ -93,12 +129,11 @@ Ring nextRing(const std::vector<PruneView>& views) {
         for (int y = 0; y < height; ++y) {
             const auto here = v.kept.row(y), above = v.kept.row(std::max(0, y - 1)),
                        below = v.kept.row(std::min(height - 1, y + 1));
-            const auto surface = v.surface.w.row(y);
             const auto grown = ring.kept[i].row(y);
             for (int x = 0; x < width; ++x) column[x + 1] = here[x] | above[x] | below[x];
             for (int x = 0; x < width; ++x) {
                 const bool beside = (column[x] | column[x + 1] | column[x + 2]) != 0;
-                if (!beside || here[x] || std::isnan(surface[x])) continue;
+                if (!beside || here[x] || !v.point(x, y)) continue;
                 grown[x] = 1;
                 ++added[i];
             }
@@ -111,8 +146,10 @@ Ring nextRing(const std::vector<PruneView>& views) {
 double lostError(const std::vector<PruneView>& views) {
     double sum = 0;
     for (const auto& v : views) {
-        for (std::size_t k = 0; k < v.kept.count(); ++k) {
-            if (!v.kept.pixels()[k]) sum += v.error.pixels()[k];
+        for (int y = 0; y < v.kept.height(); ++y) {
+            for (int x = 0; x < v.kept.width(); ++x) {
+                if (v.point(x, y) && !v.kept.at(x, y)) sum += v.errors[v.places.at(x, y)];
+            }
         }
     }
     return sum;
@@ -135,7 +172,7 @@ void giveBack(std::vector<PruneView>& views, std::int64_t budget, double mostErr
                 for (int py = y; py < std::min(y + kBlock, v.kept.height()); ++py) {
                     for (int px = x; px < std::min(x + kBlock, v.kept.width()); ++px) {
                         if (v.kept.at(px, py) || !v.point(px, py)) continue;
-                        b.error += v.error.at(px, py);
+                        b.error += v.errors[v.places.at(px, py)];
                         ++b.pixels;
                     }
                 }
@@ -276,24 +313,13 @@ void keepOnly(const Image<std::uint8_t>& kept, ReferenceView& view) {
     if (auto* c = view.texture.rgbaFloat()) smoothFarColours(state, *c);
 }
 
-Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& job) {
-    STX_CHECK(checkSettings(settings));
-    STX_CHECK(bundle.check());
-    std::uint64_t pixels = 0;
-    for (const auto& v : bundle.views) pixels += v.depth.count();
-    STX_CHECK(job.limits.checkAllocation(pixels, 24, "pruning"));
-    PruneReport report;
-    report.sourcePixels = bundle.pointCount();
-    std::vector<DepthSurface> surfaces(bundle.views.size());
-    parallelFor(0, static_cast<std::int64_t>(surfaces.size()),
-                [&](std::int64_t i) { surfaces[i] = depthSurface(bundle.views[i], {}); });
-    const std::vector<int> rank = rankViews(bundle, surfaces);
-    STX_CHECK(job.checkCancelled());
-    STX_TRY(auto views, preparePruning(bundle, rank, std::move(surfaces), job));
+namespace {
 
+/// Gives away what others show, down to the budget; what is kept then.
+Result<std::int64_t> giveAwayTo(std::int64_t budget, std::vector<PruneView>& views,
+                                const std::vector<int>& rank, const PruneSettings& settings,
+                                Job& job) {
     PruneSettings now = settings;
-    const std::int64_t budget =
-        settings.budget > 0 ? settings.budget : std::numeric_limits<std::int64_t>::max();
     // A wanted quality is reached from below: the least set first, then blocks come back.
     if (settings.minPsnr > 0 && settings.budget == 0)
         now.rateTolerance = std::max(now.rateTolerance, 2.0);
@@ -302,12 +328,7 @@ Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& jo
     if (countKept(views) > budget) {
         // Coarser and less alike replacements, rather than an object with holes. From the start:
         // what the first round locked would be in the way.
-        for (auto& v : views) {
-            for (std::size_t k = 0; k < v.kept.count(); ++k)
-                v.kept.pixels()[k] = std::isnan(v.surface.w.pixels()[k]) ? 0 : 1;
-            v.locked = Image<std::uint8_t>(v.kept.width(), v.kept.height(), 0);
-            v.error = Image<float>(v.kept.width(), v.kept.height(), 0.0f);
-        }
+        for (auto& v : views) v.keepAll();
         now.rateTolerance = 1e6;
         now.colourTolerance = 1;
         giveAway(views, rank, now);
@@ -315,13 +336,87 @@ Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& jo
             "the pruning budget is met only by giving away pixels that other views show more "
             "coarsely");
     }
-    std::int64_t kept = countKept(views);
+    const std::int64_t kept = countKept(views);
     if (kept > budget)
         return fail(
             ErrorCode::invalidInput,
             "a budget of {} pixels is too small: the views show {} pixels of surface that only "
             "one of them sees, and pruning leaves no holes; allow at least that many",
             budget, kept);
+    return kept;
+}
+
+/// Views without what another view shows. Nothing else of them changes.
+class PrunedViews : public ViewTable {
+  public:
+    PrunedViews(std::unique_ptr<ViewTable> table, Bundle headers, Pruning pruning)
+        : ViewTable(std::move(headers), table->kinds(),
+                    table->planesKnown() ? Planes::known : Planes::withPixels),
+          table_(std::move(table)),
+          pruning_(std::move(pruning)) {}
+
+    std::uint64_t bytesHeld() const override { return table_->bytesHeld(); }
+    std::uint64_t bytesToMake(std::size_t index) const override {
+        constexpr std::uint64_t kCopyAndMasks = 24;  // for each pixel, beside the view
+        return std::max(table_->bytesToMake(index),
+                        bytesOf(index) + kCopyAndMasks * pixelsOf(index));
+    }
+    std::string where() const override { return table_->where(); }
+    int mostAtOnce() const override { return table_->mostAtOnce(); }
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
+        STX_TRY(auto whole, table_->view(index, job));
+        // Nobody else has it, unless it is in memory.
+        auto view = whole.use_count() == 1
+                        ? std::const_pointer_cast<ReferenceView>(std::move(whole))
+                        : std::make_shared<ReferenceView>(*whole);
+        keepOnly(pruning_.kept[index], *view);
+        return view;
+    }
+
+  private:
+    std::unique_ptr<ViewTable> table_;
+    Pruning pruning_;
+};
+
+}  // namespace
+
+Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& settings, Job& job) {
+    STX_CHECK(checkSettings(settings));
+    if (table.whole()) STX_CHECK(table.about().check());
+    std::uint64_t pixels = 0;
+    for (std::size_t i = 0; i < table.count(); ++i) pixels += table.pixelsOf(i);
+    STX_CHECK(job.limits.checkAllocation(pixels, 24, "pruning"));
+    Pruning out;
+    PruneReport& report = out.report;
+    std::vector<PruneView> views(table.count());
+    std::vector<std::int64_t> points(table.count());
+    STX_CHECK(forEachView(
+        table, kPreparing, job,
+        [&](std::size_t i, const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
+            views[i] = preparePruning(*view);
+            points[i] = view->pointCount();
+            return {};
+        }));
+    for (const std::int64_t n : points) report.sourcePixels += n;
+    const std::vector<int> rank = rankViews(views, report.sourcePixels);
+    for (PruneView& v : views) {
+        // In their room: what is freed between the views is seldom given back.
+        v.errors = std::move(v.depths);
+        v.keepAll();
+    }
+    STX_CHECK(job.checkCancelled());
+    findPartners(views, rank);
+    const std::int64_t budget =
+        settings.budget > 0 ? settings.budget : std::numeric_limits<std::int64_t>::max();
+    STX_TRY(std::int64_t kept, giveAwayTo(budget, views, rank, settings, job));
+    for (PruneView& v : views) {
+        v.locked = {};
+        v.surfels = {};
+        v.colours = {};
+        v.linear = {};
+    }
     for (int ring = 0; ring < settings.overlap; ++ring) {
         Ring grown = nextRing(views);
         if (kept + grown.added > budget) break;
@@ -338,10 +433,30 @@ Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& jo
     report.keptPixels = countKept(views);
     const double error = lostError(views) / all;
     report.psnr = error > 0 ? -10 * std::log10(error) : std::numeric_limits<double>::infinity();
-    parallelFor(0, static_cast<std::int64_t>(views.size()),
-                [&](std::int64_t i) { keepOnly(views[i].kept, bundle.views[i]); });
-    for (const auto& v : bundle.views) report.emptiedViews += v.pointCount() == 0 ? 1 : 0;
-    return report;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        const std::int64_t left = std::ranges::count(views[i].kept.pixels(), std::uint8_t{1});
+        report.emptiedViews += left == 0 ? 1 : 0;
+        out.changed.push_back(left < points[i]);
+        out.kept.push_back(std::move(views[i].kept));
+    }
+    return out;
+}
+
+Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& job) {
+    STX_TRY(const Pruning pruning, findPruning(*viewsOf(bundle), settings, job));
+    parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
+        keepOnly(pruning.kept[static_cast<std::size_t>(i)],
+                 bundle.views[static_cast<std::size_t>(i)]);
+    });
+    return pruning.report;
+}
+
+std::unique_ptr<ViewTable> prunedViews(std::unique_ptr<ViewTable> table, Pruning pruning) {
+    Job none;  // nothing is read
+    Bundle headers = *someViews(*table, std::vector<bool>(table->count(), false), nullptr, none);
+    for (std::size_t i = 0; i < headers.views.size(); ++i)
+        if (pruning.changed[i]) headers.views[i].pruned = true;
+    return std::make_unique<PrunedViews>(std::move(table), std::move(headers), std::move(pruning));
 }
 
 }  // namespace stx

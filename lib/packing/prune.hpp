@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "lib/base/image.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
 

@@ -1,9 +1,13 @@
 #include "lib/packing/redundancy.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "lib/base/parallel.hpp"
+#include "lib/selection/coverage.hpp"
 
 namespace stx {
 namespace {
@@ -14,9 +18,8 @@ constexpr std::size_t kMostPartners = 24;
 /// Share of the distance by which the corners of a quad may differ for it to be drawn.
 constexpr double kBridged = 0.009;
 
-void findBounds(PruneView& p) {
+void findBounds(const ReferenceView& v, PruneView& p) {
     Bounds bounds;
-    const ReferenceView& v = *p.view;
     for (int y = 0; y < v.depth.height(); ++y) {
         for (int x = 0; x < v.depth.width(); ++x) {
             if (p.point(x, y)) bounds.add(v.worldPoint(x, y));
@@ -27,9 +30,30 @@ void findBounds(PruneView& p) {
     p.worldRadius = bounds.radius();
 }
 
+/// Room for what is looked at of the points, and what that is.
+void keepPoints(const ReferenceView& view, const DepthSurface& surface, PruneView& p) {
+    p.places = BlockPlaces(p.kept);
+    p.surfels.resize(p.places.size());
+    p.depths.resize(p.places.size());
+    const auto* bytes = view.texture.rgba8();
+    bytes ? p.colours.resize(p.places.size()) : p.linear.resize(p.places.size());
+    for (int y = 0; y < p.kept.height(); ++y) {
+        for (int x = 0; x < p.kept.width(); ++x) {
+            if (!p.point(x, y)) continue;
+            const std::size_t at = p.places.at(x, y);
+            p.surfels[at] = {surface.w.at(x, y), surface.gradient.at(x, y)};
+            p.depths[at] = view.depth.at(x, y);
+            if (bytes)
+                p.colours[at] = bytes->at(x, y);
+            else
+                p.linear[at] = view.texture.rgbaFloat()->at(x, y);
+        }
+    }
+}
+
 /// Neither sphere nor frustum rules out that `to` shows points of `from`.
 bool mayShow(const PruneView& to, const PruneView& from) {
-    const Camera& camera = to.view->camera;
+    const Camera& camera = to.camera;
     const glm::dvec3 c = to.cameraFromWorld * (from.worldCentre - camera.position);
     const double r = from.worldRadius;
     if (glm::length(from.worldCentre - to.worldCentre) > from.worldRadius + to.worldRadius)
@@ -44,43 +68,155 @@ bool mayShow(const PruneView& to, const PruneView& from) {
 }
 
 /// Samples per area of the surface that pixel (x, y) lies on.
-double rateAt(const PruneView& p, int x, int y, double w) {
-    const PixelSteps steps = planeSteps(p.view->camera, x, y, w, p.surface.gradient.at(x, y));
+double rateAt(const PruneView& p, int x, int y, const PruneView::Surfel& s) {
+    const PixelSteps steps = planeSteps(p.camera, x, y, s.w, s.gradient);
     const double area = glm::length(glm::cross(steps.alongX, steps.alongY));
     return area > 0 ? 1.0 / area : 0.0;
 }
 
 }  // namespace
 
-Result<std::vector<PruneView>> preparePruning(const Bundle& bundle, const std::vector<int>& rank,
-                                              std::vector<DepthSurface> surfaces, Job& job) {
-    std::vector<PruneView> views(bundle.views.size());
-    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
-        PruneView& p = views[i];
-        p.view = &bundle.views[i];
-        p.surface = std::move(surfaces[i]);
-        p.worldFromCamera = glm::mat3_cast(p.view->camera.orientation);
-        p.cameraFromWorld = glm::transpose(p.worldFromCamera);
-        p.kept = Image<std::uint8_t>(p.view->depth.width(), p.view->depth.height(), 0);
-        p.locked = p.kept;
-        for (std::size_t k = 0; k < p.kept.count(); ++k)
-            p.kept.pixels()[k] = std::isnan(p.surface.w.pixels()[k]) ? 0 : 1;
-        p.error = Image<float>(p.kept.width(), p.kept.height(), 0.0f);
-        findBounds(p);
-    });
-    STX_CHECK(job.checkCancelled());
+BlockPlaces::BlockPlaces(const Image<std::uint8_t>& wanted) {
+    const auto blocks = [](int pixels) {
+        return (static_cast<std::size_t>(pixels) + kSide - 1) / kSide;
+    };
+    blocksX_ = blocks(wanted.width());
+    first_.resize(blocksX_ * blocks(wanted.height()));
+    std::vector<bool> has(first_.size());
+    for (int y = 0; y < wanted.height(); ++y) {
+        const std::size_t row = static_cast<unsigned>(y) / kSide * blocksX_;
+        for (int x = 0; x < wanted.width(); ++x)
+            if (wanted.at(x, y)) has[row + static_cast<unsigned>(x) / kSide] = true;
+    }
+    for (std::size_t block = 0; block < has.size(); ++block) {
+        if (!has[block]) continue;
+        first_[block] = size_;
+        size_ += std::size_t{kSide} * kSide;
+    }
+}
+
+Image<float> PruneView::depth() const {
+    Image<float> out(kept.width(), kept.height(), kNoDepth);
+    for (int y = 0; y < out.height(); ++y) {
+        for (int x = 0; x < out.width(); ++x)
+            if (point(x, y)) out.at(x, y) = depths[places.at(x, y)];
+    }
+    return out;
+}
+
+void PruneView::keepAll() {
+    for (std::size_t k = 0; k < kept.count(); ++k) kept.pixels()[k] = points[k] ? 1 : 0;
+    locked.assign(places.size(), 0);
+    errors.assign(places.size(), 0.0f);
+    findLiveBlocks();
+}
+
+void PruneView::findLiveBlocks() {
+    constexpr int side = BlockPlaces::kSide;
+    const int columns = (kept.width() + side - 1) / side, rows = (kept.height() + side - 1) / side;
+    liveBlocks.assign(static_cast<std::size_t>(columns) * rows, 0);
+    for (int y = 0; y < kept.height(); ++y) {
+        for (int x = 0; x < kept.width(); ++x)
+            if (kept.at(x, y))
+                liveBlocks[static_cast<std::size_t>(y / side) * columns + x / side] = 1;
+    }
+}
+
+namespace {
+
+/// Where the kept points of a block are between, world.
+using Corners = std::array<glm::dvec3, 8>;
+
+std::optional<Corners> cornersOf(const PruneView& view, const PruneBlock& block) {
+    float least = std::numeric_limits<float>::max(), most = 0;
+    for (int y = block.y0; y < block.y1; ++y) {
+        for (int x = block.x0; x < block.x1; ++x) {
+            if (!view.kept.at(x, y)) continue;
+            least = std::min(least, view.surfel(x, y).w);
+            most = std::max(most, view.surfel(x, y).w);
+        }
+    }
+    if (!(least <= most)) return std::nullopt;
+    Corners corners;
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+        const double w = k & 4 ? most : least;
+        corners[k] =
+            view.camera.position +
+            view.worldFromCamera * view.camera.unproject(k & 1 ? block.x1 : block.x0,
+                                                         k & 2 ? block.y1 : block.y0,
+                                                         view.camera.orthographic ? w : 1 / w);
+    }
+    return corners;
+}
+
+/// Whether something between the corners may fall on kept pixels of a view.
+bool mayFallOnKept(const PruneView& to, const Corners& corners) {
+    constexpr int side = BlockPlaces::kSide;
+    const Camera& camera = to.camera;
+    glm::dvec2 low(std::numeric_limits<double>::max()), high(-low);
+    for (const glm::dvec3& corner : corners) {
+        const glm::dvec3 inCamera = to.cameraFromWorld * (corner - camera.position);
+        if (!camera.orthographic && !(inCamera.z < 0)) return true;
+        const glm::dvec2 pixel(camera.project(inCamera));
+        low = glm::min(low, pixel);
+        high = glm::max(high, pixel);
+    }
+    // The four pixels around a place, and one more for rounding.
+    const glm::dvec2 last(camera.width - 1, camera.height - 1);
+    const glm::ivec2 first(glm::clamp(low - 2.0, glm::dvec2(0), last)),
+        end(glm::clamp(high + 2.0, glm::dvec2(0), last));
+    const int columns = (camera.width + side - 1) / side;
+    for (int y = first.y / side; y <= end.y / side; ++y)
+        for (int x = first.x / side; x <= end.x / side; ++x)
+            if (to.liveBlocks[static_cast<std::size_t>(y) * columns + x]) return true;
+    return false;
+}
+
+}  // namespace
+
+std::vector<int> partnersOfBlock(const std::vector<PruneView>& views, const PruneView& from,
+                                 const PruneBlock& block) {
+    std::vector<int> out;
+    const auto corners = cornersOf(from, block);
+    if (!corners) return out;
+    for (const int j : from.partners)
+        if (mayFallOnKept(views[static_cast<std::size_t>(j)], *corners)) out.push_back(j);
+    return out;
+}
+
+PruneView preparePruning(const ReferenceView& view) {
+    const DepthSurface surface = depthSurface(view, {});
+    PruneView p;
+    p.camera = view.camera;
+    p.background = view.background;
+    p.step = surface.step;
+    p.codeStep = candidateOf(view).step;
+    p.worldFromCamera = glm::mat3_cast(view.camera.orientation);
+    p.cameraFromWorld = glm::transpose(p.worldFromCamera);
+    p.kept = Image<std::uint8_t>(view.depth.width(), view.depth.height());
+    p.points.resize(p.kept.count());
+    for (std::size_t k = 0; k < p.kept.count(); ++k) {
+        p.points[k] = !std::isnan(surface.w.pixels()[k]);
+        p.kept.pixels()[k] = p.points[k] ? 1 : 0;
+    }
+    keepPoints(view, surface, p);
+    findBounds(view, p);
+    return p;
+}
+
+void findPartners(std::vector<PruneView>& views, const std::vector<int>& rank) {
     parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
         PruneView& p = views[i];
         for (const int j : rank) {
             // What shows now and what is remembered do not stand for each other.
-            const bool alike = views[j].view->background == p.view->background;
+            const bool alike = views[j].background == p.background;
             if (j != i && alike && mayShow(views[j], p)) p.partners.push_back(j);
         }
         if (p.partners.size() <= kMostPartners) return;
         // The nearest by direction and place, still in the order of rank.
         std::vector<std::pair<double, int>> near;
         for (const int j : p.partners) {
-            const Camera &a = p.view->camera, &b = views[j].view->camera;
+            const Camera &a = p.camera, &b = views[j].camera;
             near.emplace_back(glm::length(a.position - b.position) / (p.worldRadius + 1e-30) +
                                   2 * glm::length(a.forward() - b.forward()),
                               j);
@@ -90,16 +226,15 @@ Result<std::vector<PruneView>> preparePruning(const Bundle& bundle, const std::v
         for (std::size_t k = 0; k < kMostPartners; ++k) close[near[k].second] = true;
         std::erase_if(p.partners, [&](int j) { return !close[j]; });
     });
-    STX_CHECK(job.checkCancelled());
-    return views;
 }
 
 PrunePixel::PrunePixel(const PruneView& view, int x, int y) {
-    const Camera& camera = view.view->camera;
-    const double w = view.surface.w.at(x, y);
+    const Camera& camera = view.camera;
+    const PruneView::Surfel& surfel = view.surfel(x, y);
+    const double w = surfel.w;
     const double dist = camera.orthographic ? w : 1.0 / w;
     world = camera.position + view.worldFromCamera * camera.unproject(x + 0.5, y + 0.5, dist);
-    const PixelSteps steps = planeSteps(camera, x, y, w, view.surface.gradient.at(x, y));
+    const PixelSteps steps = planeSteps(camera, x, y, w, surfel.gradient);
     // Along y runs down, so this faces the viewpoint.
     const glm::dvec3 across = glm::cross(steps.alongY, steps.alongX);
     const double area = glm::length(across);
@@ -107,13 +242,13 @@ PrunePixel::PrunePixel(const PruneView& view, int x, int y) {
         rate = 1.0 / area;
         normal = view.worldFromCamera * (across * rate);
     }
-    colour = view.view->texture.at(x, y);
+    colour = view.colour(view.places.at(x, y));
 }
 
 Replacement findReplacement(const PruneView& from, const PrunePixel& source, const PruneView& to,
                             const PruneSettings& settings) {
     Replacement r;
-    const Camera& b = to.view->camera;
+    const Camera& b = to.camera;
     const glm::dvec3 towards = b.orthographic ? -b.forward() : b.position - source.world;
     if (!(glm::dot(source.normal, towards) > 0)) return r;
     const glm::dvec3 inCamera = to.cameraFromWorld * (source.world - b.position);
@@ -126,38 +261,40 @@ Replacement findReplacement(const PruneView& from, const PrunePixel& source, con
     for (int k = 0; k < 4; ++k) {
         if (!to.kept.at(x0 + (k & 1), y0 + (k >> 1))) return r;
     }
+    std::array<std::size_t, 4> places{};
+    for (std::size_t k = 0; k < 4; ++k)
+        places[k] = to.places.at(x0 + static_cast<int>(k & 1), y0 + static_cast<int>(k >> 1));
     // All four must be this surface: their planes meet the line of sight at the point.
     const double wz = affineDepth(b, z);
     const double share =
         settings.depthTolerance * (b.orthographic ? std::max(z, from.worldRadius) : wz);
-    const double steps =
-        0.5 * (from.surface.step + to.surface.step) * (b.orthographic ? 1.0 : wz * wz);
+    const double steps = 0.5 * (from.step + to.step) * (b.orthographic ? 1.0 : wz * wz);
     for (int k = 0; k < 4; ++k) {
         const int px = x0 + (k & 1), py = y0 + (k >> 1);
-        const glm::dvec2 g = to.surface.gradient.at(px, py);
-        const double predicted = to.surface.w.at(px, py) + g.x * (fx - px) + g.y * (fy - py);
+        const PruneView::Surfel& surfel = to.surfels[places[static_cast<std::size_t>(k)]];
+        const glm::dvec2 g = surfel.gradient;
+        const double predicted = surfel.w + g.x * (fx - px) + g.y * (fy - py);
         if (std::abs(predicted - wz) > share + steps + 0.5 * (std::abs(g.x) + std::abs(g.y)))
             return r;
     }
     // Renderers bridge neighbours only when their depths are close; a quad they leave open shows
     // nothing, whatever its corners say.
-    double low = to.surface.w.at(x0, y0), high = low;
-    for (int k = 1; k < 4; ++k) {
-        const double corner = to.surface.w.at(x0 + (k & 1), y0 + (k >> 1));
+    double low = to.surfels[places[0]].w, high = low;
+    for (std::size_t k = 1; k < 4; ++k) {
+        const double corner = to.surfels[places[k]].w;
         low = std::min(low, corner);
         high = std::max(high, corner);
     }
     if (!(high - low < kBridged * (b.orthographic ? std::max(high, to.worldRadius) : high)))
         return r;
     const int nx = static_cast<int>(pixel.x), ny = static_cast<int>(pixel.y);
-    if (rateAt(to, nx, ny, to.surface.w.at(nx, ny)) * settings.rateTolerance *
-            settings.rateTolerance <
-        source.rate)
+    const PruneView::Surfel& nearest =
+        to.surfels[places[static_cast<std::size_t>(nx - x0 + 2 * (ny - y0))]];
+    if (rateAt(to, nx, ny, nearest) * settings.rateTolerance * settings.rateTolerance < source.rate)
         return r;
     const auto tx = static_cast<float>(fx - x0), ty = static_cast<float>(fy - y0);
-    const Texture& other = to.view->texture;
-    const glm::vec3 corner[4] = {other.at(x0, y0), other.at(x0 + 1, y0), other.at(x0, y0 + 1),
-                                 other.at(x0 + 1, y0 + 1)};
+    const glm::vec3 corner[4] = {to.colour(places[0]), to.colour(places[1]), to.colour(places[2]),
+                                 to.colour(places[3])};
     const glm::vec3 found =
         glm::mix(glm::mix(corner[0], corner[1], tx), glm::mix(corner[2], corner[3], tx), ty);
     const glm::vec3 contrast =

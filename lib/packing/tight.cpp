@@ -36,11 +36,15 @@ Result<RectanglePacking> packForAtlas(const std::vector<glm::ivec2>& sizes,
     return packing;
 }
 
-Result<AtlasLayout> tightLayout(const Bundle& bundle, const PackSettings& settings, int maxPages) {
-    std::vector<std::vector<Patch>> patches(bundle.views.size());
-    parallelFor(0, static_cast<std::int64_t>(patches.size()), [&](std::int64_t i) {
-        patches[i] = contentPatches(bundle.views[i], settings.padding);
-    });
+Result<AtlasLayout> tightLayout(const ViewTable& table, const PackSettings& settings, int maxPages,
+                                Job& job) {
+    std::vector<std::vector<Patch>> patches(table.count());
+    STX_CHECK(forEachView(
+        table, {"an atlas", 0}, job,
+        [&](std::size_t i, const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
+            patches[i] = contentPatches(*view, settings.padding);
+            return {};
+        }));
     AtlasLayout layout;
     std::vector<glm::ivec2> sizes;
     for (std::size_t i = 0; i < patches.size(); ++i) {

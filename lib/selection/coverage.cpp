@@ -105,67 +105,68 @@ Sighting sightingOf(const CandidateView& view, const SurfaceSample& sample) {
     return s;
 }
 
-std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count,
-                                        std::span<const DepthSurface> surfaces) {
-    std::vector<CandidateView> views;
-    std::int64_t points = 0;
-    for (const auto& v : bundle.views) {
-        views.push_back(
-            {v.camera, v.camera, &v.depth, v.depthBits == 32 ? 0.0 : v.depthCode().step()});
-        points += v.pointCount();
-    }
-    // Every stride-th point of each view, from normals as robust as can be.
-    const std::int64_t stride = std::max<std::int64_t>(1, points / std::max(count, 1));
-    std::vector<std::vector<SurfaceSample>> perView(bundle.views.size());
-    parallelFor(0, static_cast<std::int64_t>(perView.size()), [&](std::int64_t i) {
-        const ReferenceView& v = bundle.views[i];
-        DepthSurface made;
-        if (surfaces.empty()) made = depthSurface(v, {});
-        const DepthSurface& surface = surfaces.empty() ? made : surfaces[i];
-        std::int64_t seen = i * 7919 % stride;
-        for (int y = 0; y < v.depth.height(); ++y) {
-            for (int x = 0; x < v.depth.width(); ++x) {
-                if (std::isnan(surface.w.at(x, y)) || seen++ % stride != 0) continue;
-                SurfaceSample s;
-                s.position = v.worldPoint(x, y);
-                s.normal = v.camera.orientation * planeNormal(v.camera, x, y, surface.w.at(x, y),
-                                                              surface.gradient.at(x, y));
-                double density = 0;  // samples of all views per unit of area
-                for (std::size_t k = 0; k < views.size(); ++k) {
-                    const Sighting by = sightingOf(views[k], s);
-                    if (by.visible || static_cast<std::size_t>(i) == k)
-                        density += std::max(by.cosine, 0.05) *
-                                   (by.visible ? by.density * by.density
-                                               : 1 / (v.camera.sampleSpacing(v.depth.at(x, y)).x *
-                                                      v.camera.sampleSpacing(v.depth.at(x, y)).y));
-                }
-                s.area = static_cast<double>(stride) / density;
-                perView[i].push_back(s);
-            }
-        }
-    });
-    std::vector<SurfaceSample> samples;
-    for (const auto& some : perView) samples.insert(samples.end(), some.begin(), some.end());
-    return samples;
+CandidateView candidateOf(const ReferenceView& view) {
+    return {view.camera, view.camera, &view.depth,
+            view.depthBits == 32 ? 0.0 : view.depthCode().step()};
 }
 
-CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
-                          const std::vector<CandidateView>& candidates, double targetDensity) {
+ViewSamples samplesOfView(const ReferenceView& view, std::size_t number, std::int64_t stride,
+                          const SurfaceAt& surface) {
+    ViewSamples out;
+    std::int64_t seen = static_cast<std::int64_t>(number) * 7919 % stride;
+    for (int y = 0; y < view.depth.height(); ++y) {
+        for (int x = 0; x < view.depth.width(); ++x) {
+            if (!hasPoint(view.depth.at(x, y)) || seen++ % stride != 0) continue;
+            const auto [w, gradient] = surface(x, y);
+            SurfaceSample s;
+            s.position = view.worldPoint(x, y);
+            s.normal = view.camera.orientation * planeNormal(view.camera, x, y, w, gradient);
+            out.samples.push_back(s);
+            const glm::dvec2 spacing = view.camera.sampleSpacing(view.depth.at(x, y));
+            out.ownDensity.push_back(1 / (spacing.x * spacing.y));
+        }
+    }
+    return out;
+}
+
+namespace {
+
+/// Of a sample of view `own`, which samples it with density `ownDensity` (squared): by the density
+/// with which all views sample its place. `by`: how view k sees it.
+template <class SightingBy>
+double areaOf(std::size_t own, double ownDensity, std::size_t views, std::int64_t stride,
+              const SightingBy& by) {
+    double density = 0;  // samples of all views per unit of area
+    for (std::size_t k = 0; k < views; ++k) {
+        const Sighting s = by(k);
+        if (s.visible || own == k)
+            density += std::max(s.cosine, 0.05) * (s.visible ? s.density * s.density : ownDensity);
+    }
+    return static_cast<double>(stride) / density;
+}
+
+struct Seen {
+    std::uint32_t sample;
+    float cosine, density;
+};
+
+/// What a candidate sees of samples; `sighting`: how it sees sample i.
+template <class SightingOfSample>
+std::vector<Seen> seenOf(std::size_t samples, const SightingOfSample& sighting) {
+    std::vector<Seen> seen;
+    for (std::size_t i = 0; i < samples; ++i) {
+        const Sighting s = sighting(i);
+        if (s.visible)
+            seen.push_back({static_cast<std::uint32_t>(i), static_cast<float>(s.cosine),
+                            static_cast<float>(s.density)});
+    }
+    return seen;
+}
+
+CoverProblem problemOf(const std::vector<SurfaceSample>& samples,
+                       const std::vector<std::vector<Seen>>& seen, double targetDensity) {
     CoverProblem problem;
     for (const auto& s : samples) problem.weights.push_back(s.area);
-    struct Seen {
-        std::uint32_t sample;
-        float cosine, density;
-    };
-    std::vector<std::vector<Seen>> seen(candidates.size());
-    parallelFor(0, static_cast<std::int64_t>(candidates.size()), [&](std::int64_t v) {
-        for (std::size_t i = 0; i < samples.size(); ++i) {
-            const Sighting s = sightingOf(candidates[v], samples[i]);
-            if (s.visible)
-                seen[v].push_back({static_cast<std::uint32_t>(i), static_cast<float>(s.cosine),
-                                   static_cast<float>(s.density)});
-        }
-    });
     double target = targetDensity;
     if (!(target > 0)) {
         std::vector<float> best(samples.size(), 0.0f);
@@ -179,7 +180,7 @@ CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
             target = *middle;
         }
     }
-    problem.views.resize(candidates.size());
+    problem.views.resize(seen.size());
     for (std::size_t v = 0; v < seen.size(); ++v) {
         for (const auto& s : seen[v]) {
             const double rate = target > 0 ? std::min(1.0, s.density / target) : 1.0;
@@ -187,6 +188,65 @@ CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
         }
     }
     return problem;
+}
+
+}  // namespace
+
+std::vector<SurfaceSample> setAreas(const std::vector<ViewSamples>& ofViews,
+                                    std::span<const std::vector<Sighting>> seen,
+                                    std::int64_t stride) {
+    std::vector<SurfaceSample> out;
+    for (std::size_t i = 0; i < ofViews.size(); ++i) {
+        for (std::size_t n = 0; n < ofViews[i].samples.size(); ++n) {
+            SurfaceSample s = ofViews[i].samples[n];
+            s.area = areaOf(i, ofViews[i].ownDensity[n], seen.size(), stride,
+                            [&](std::size_t k) { return seen[k][out.size()]; });
+            out.push_back(s);
+        }
+    }
+    return out;
+}
+
+std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count) {
+    // Every stride-th point of each view, from normals as robust as can be.
+    const std::int64_t stride = std::max<std::int64_t>(1, bundle.pointCount() / std::max(count, 1));
+    std::vector<CandidateView> views;
+    for (const ReferenceView& v : bundle.views) views.push_back(candidateOf(v));
+    std::vector<ViewSamples> ofViews(bundle.views.size());
+    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
+        const ReferenceView& v = bundle.views[i];
+        const DepthSurface surface = depthSurface(v, {});
+        ViewSamples& of = ofViews[i];
+        of = samplesOfView(v, static_cast<std::size_t>(i), stride, [&](int x, int y) {
+            return std::pair(surface.w.at(x, y), surface.gradient.at(x, y));
+        });
+        for (std::size_t n = 0; n < of.samples.size(); ++n)
+            of.samples[n].area =
+                areaOf(static_cast<std::size_t>(i), of.ownDensity[n], views.size(), stride,
+                       [&](std::size_t k) { return sightingOf(views[k], of.samples[n]); });
+    });
+    std::vector<SurfaceSample> samples;
+    for (const ViewSamples& of : ofViews)
+        samples.insert(samples.end(), of.samples.begin(), of.samples.end());
+    return samples;
+}
+
+CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
+                          const std::vector<CandidateView>& candidates, double targetDensity) {
+    std::vector<std::vector<Seen>> seen(candidates.size());
+    parallelFor(0, static_cast<std::int64_t>(candidates.size()), [&](std::int64_t v) {
+        seen[v] = seenOf(samples.size(),
+                         [&](std::size_t i) { return sightingOf(candidates[v], samples[i]); });
+    });
+    return problemOf(samples, seen, targetDensity);
+}
+
+CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
+                          std::span<const std::vector<Sighting>> sightings, double targetDensity) {
+    std::vector<std::vector<Seen>> seen;
+    for (const std::vector<Sighting>& of : sightings)
+        seen.push_back(seenOf(samples.size(), [&](std::size_t i) { return of[i]; }));
+    return problemOf(samples, seen, targetDensity);
 }
 
 }  // namespace stx

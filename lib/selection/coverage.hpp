@@ -1,6 +1,10 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "lib/model/bundle.hpp"
@@ -32,9 +36,8 @@ struct CandidateView {
 
 /// About `count` samples of all that the views of a bundle show. A surface seen by many views
 /// counts once: each sample's area is the inverse of the density with which all views sample its
-/// place. `surfaces` are depthSurface() of all views; empty: they are made here.
-[[nodiscard]] std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count,
-                                                      std::span<const DepthSurface> surfaces = {});
+/// place.
+[[nodiscard]] std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count);
 
 /// How often and how well a candidate samples a piece of surface.
 struct Sighting {
@@ -43,6 +46,26 @@ struct Sighting {
     double density = 0;  ///< samples per scene unit on a surface that faces the camera
 };
 [[nodiscard]] Sighting sightingOf(const CandidateView& view, const SurfaceSample& sample);
+
+/// A view of a bundle as a candidate; its depth must outlive it.
+[[nodiscard]] CandidateView candidateOf(const ReferenceView& view);
+
+/// sampleBundle() for views that are looked at one by one: first samplesOfView() of each, then how
+/// each sees the samples of all, then setAreas().
+struct ViewSamples {
+    std::vector<SurfaceSample> samples;  ///< without their areas
+    std::vector<double> ownDensity;      ///< of each: with which its view samples it, squared
+};
+/// w and its gradient at a pixel with a point, as of depthSurface().
+using SurfaceAt = std::function<std::pair<float, glm::vec2>(int x, int y)>;
+/// Every `stride`-th point of view `number` of a bundle.
+[[nodiscard]] ViewSamples samplesOfView(const ReferenceView& view, std::size_t number,
+                                        std::int64_t stride, const SurfaceAt& surface);
+/// All samples, in the order of the views, with their areas; `seen`: for each view a sighting of
+/// each of them.
+[[nodiscard]] std::vector<SurfaceSample> setAreas(const std::vector<ViewSamples>& ofViews,
+                                                  std::span<const std::vector<Sighting>> seen,
+                                                  std::int64_t stride);
 
 /// The problem of choosing among candidates. How finely a view samples a piece of surface is
 /// s = visible * cosine * min(1, density / target), and its quality 0.9 * min(1, s / 0.4) + 0.1 *
@@ -54,6 +77,10 @@ struct Sighting {
 /// candidate has.
 [[nodiscard]] CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
                                         const std::vector<CandidateView>& candidates,
+                                        double targetDensity);
+/// The same; `seen`: for each candidate a sighting of each sample.
+[[nodiscard]] CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
+                                        std::span<const std::vector<Sighting>> seen,
                                         double targetDensity);
 
 }  // namespace stx

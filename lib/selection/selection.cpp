@@ -72,8 +72,7 @@ Result<Selection> selectViews(const Bundle& bundle, const SelectSettings& settin
     std::vector<CandidateView> candidates;
     int empty = 0;
     for (const auto& v : bundle.views) {
-        candidates.push_back(
-            {v.camera, v.camera, &v.depth, v.depthBits == 32 ? 0.0 : v.depthCode().step()});
+        candidates.push_back(candidateOf(v));
         empty += v.pointCount() == 0 ? 1 : 0;
     }
     if (empty == static_cast<int>(bundle.views.size()))

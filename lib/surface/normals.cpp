@@ -70,6 +70,7 @@ Result<ViewChange> bakeOfViews(const BakeSettings& settings, const PeakMemory& t
     };
     change.kinds = [](ViewImageKinds& kinds) { kinds.normal = kinds.splatU = kinds.splatV = true; };
     change.takes = takes;
+    change.keepsPixels = true;
     return change;
 }
 

@@ -195,6 +195,29 @@ def from_few(args, folder):
     return wrong
 
 
+# Of pruning 36 views of 512² of which a third is points, and of an atlas of them, bytes for each pixel of the views. All
+# views, what pruning knows of each pixel and the atlas side by side take 40.
+PRUNE = 20
+
+
+def pruned_one_by_one(args, folder):
+    """What takes too much of an atlas of many views."""
+    wrong, mega = [], 36 * 512 * 512 / 1e6
+    for options in ("", "--prune", "--prune --layout tight") if os.path.exists(args.model) else ():
+        name = f"many pack {options}"
+        if args.only not in name:
+            continue
+        done = must([args.stx, "pack", "many36.exr", "-o", "pruned" + options.replace(" ", "_"), "--threads", "2"]
+                    + options.split(), folder)
+        peak = done.usage.ru_maxrss / 1024
+        each = (peak - 40) * 1.048576 / mega
+        if args.measure:
+            print(f"{name:46} {peak:6.1f} MiB, {each:.1f} bytes a pixel", flush=True)
+        elif each > PRUNE:
+            wrong.append(f"{name}: {peak:.1f} MiB, {each:.1f} bytes a pixel")
+    return wrong
+
+
 def main():
     args = harness.arguments(__doc__, measure=0, pixels=14, views=1, only="")
     wrong = []
@@ -240,6 +263,7 @@ def main():
         wrong += above_info(args, folder)
         wrong += many_views(args, folder)
         wrong += from_few(args, folder)
+        wrong += pruned_one_by_one(args, folder)
     print("\n".join(wrong))
     sys.exit(1 if wrong else 0)
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Pictures along a wall: shards read the views that their pictures need, and draw what all views draw. What a
-file says of views that disagrees with their pixels is damage."""
+"""Pictures along a wall: shards read the views that their pictures need, and draw what all views draw. Whatever writes
+exact views into .exr says what is known of them, and of no others. What a file says of views that disagrees with their
+pixels is damage."""
 import json
 import math
 import os
@@ -56,27 +57,46 @@ def bytes_read(command, folder):
     return int(found.group(1))
 
 
+def read(folder, name):
+    with open(os.path.join(folder, name), "rb") as file:
+        return file.read()
+
+
+def summaries(data):
+    """Where the texts of summaries begin in a file."""
+    return [m.end() for m in re.finditer(rb"stx:summary\0string\0....", data, re.DOTALL)]
+
+
+def without_summaries(folder, name, target):
+    """The same file, whose summaries are of a version that nobody knows."""
+    data = bytearray(read(folder, name))
+    for place in summaries(data):
+        data[place] = ord("z")
+    with open(os.path.join(folder, target), "wb") as file:
+        file.write(data)
+
+
 def check_shards(stx, folder):
     wrong, total = [], 0
-    size = os.path.getsize(os.path.join(folder, "refined.exr"))
+    size = os.path.getsize(os.path.join(folder, "views.exr"))
     draw = [stx, "render", "--cameras", "path.json", "--backend", "cpu", "--quiet"]
     for shard in range(1, SHARDS + 1):
-        total += bytes_read(draw + ["refined.exr", "-o", "some_%02d.png", "--shard", f"{shard}/{SHARDS}"], folder)
+        total += bytes_read(draw + ["views.exr", "-o", "some_%02d.png", "--shard", f"{shard}/{SHARDS}"], folder)
     print(f"{SHARDS} shards read {total / size:.2f} times the file")
     if total > READ * size:
         wrong.append(f"{SHARDS} shards read {total / size:.2f} times the file; at most {READ} are expected")
-    harness.must(draw + ["views.exr", "-o", "all_%02d.png"], folder)
+    harness.must(draw + ["plain.exr", "-o", "all_%02d.png"], folder)
     for k in range(PICTURES):
         with open(os.path.join(folder, f"some_{k:02d}.png"), "rb") as some:
             with open(os.path.join(folder, f"all_{k:02d}.png"), "rb") as of_all:
                 if some.read() != of_all.read():
                     wrong.append(f"picture {k} is not that from all views")
     # Views that are exact and larger than memory are looked at one by one.
-    harness.must([stx, "refine", "views.exr", "-o", "few.exr", "--quiet", "--max-memory", "64"], folder)
-    if harness.tree(folder)["few.exr"] != harness.tree(folder)["refined.exr"]:
+    harness.must([stx, "refine", "plain.exr", "-o", "few.exr", "--quiet", "--max-memory", "64"], folder)
+    if read(folder, "few.exr") != read(folder, "views.exr"):
         wrong.append("refine with little memory does not write the same")
     # From a file beside the picture, too.
-    harness.must(draw + ["refined.exr", "-o", "tight_%02d.png", "--shard", f"3/{SHARDS}", "--max-memory", "24"], folder)
+    harness.must(draw + ["views.exr", "-o", "tight_%02d.png", "--shard", f"3/{SHARDS}", "--max-memory", "24"], folder)
     for k in range(4, 6):
         with open(os.path.join(folder, f"tight_{k:02d}.png"), "rb") as tight:
             with open(os.path.join(folder, f"all_{k:02d}.png"), "rb") as of_all:
@@ -88,13 +108,9 @@ def check_shards(stx, folder):
 def check_lies(stx, folder):
     """A summary of other pixels."""
     wrong = []
-    with open(os.path.join(folder, "refined.exr"), "rb") as file:
-        data = bytearray(file.read())
-    places = [m.end() for m in re.finditer(rb"stx:summary\0string\0....1 ", data, re.DOTALL)]
-    if len(places) != VIEWS:
-        return [f"{len(places)} summaries, {VIEWS} are expected"]
-    for place in places:
-        data[place + 15] ^= 1  # the last digit of the points
+    data = bytearray(read(folder, "views.exr"))
+    for place in summaries(data):
+        data[place + 17] ^= 1  # the last digit of the points
     with open(os.path.join(folder, "lies.exr"), "wb") as file:
         file.write(data)
     draw = [stx, "render", "lies.exr", "-o", "lie.png", "--eye=8,0,2", "--target", "8,0,0", "--backend", "cpu"]
@@ -105,11 +121,42 @@ def check_lies(stx, folder):
     if os.path.exists(os.path.join(folder, "lie.png")):
         wrong.append("a summary of other pixels: there is a picture")
     # What no stx wrote says nothing, and all views are read.
-    for place in places:
-        data[place] = ord("z")
-    with open(os.path.join(folder, "lies.exr"), "wb") as file:
-        file.write(data)
+    without_summaries(folder, "lies.exr", "lies.exr")
     harness.must(draw + ["--quiet"], folder)
+    return wrong
+
+
+def check_writers(stx, folder):
+    """Which files have summaries."""
+    wrong = []
+
+    def made(words, name, count):
+        harness.must([stx] + words + ["-o", name, "--quiet"], folder, timeout=600)
+        found = len(summaries(read(folder, name)))
+        if found != count:
+            wrong.append(f"{' '.join(words)}: {found} summaries, {count} are expected")
+        return read(folder, name)
+
+    few = ["--views", "ring:5", "--size", "96x96"]
+    whole = made(["convert", "wall.obj"] + few, "few.exr", 5)
+    without_summaries(folder, "few.exr", "bare.exr")
+    for name in ("few.exr", "bare.exr"):
+        if made(["convert", name], "again.exr", 5) != whole:
+            wrong.append(f"convert {name}: the copy is not that of the mesh")
+    made(["convert", "few.exr", "--report", "report.json"], "reported.exr", 5)
+    made(["bake", "few.exr"], "baked.exr", 5)
+    made(["select", "few.exr", "--count", "3"], "selected.exr", 3)
+    harness.must([stx, "convert", "few.exr", "-o", "few.mp4", "--quiet"], folder)
+    made(["convert", "few.mp4"], "of_mp4.exr", 5)
+    # Nothing is known of views that look along parallel lines, of points, and of captured ones whose missing depth
+    # may be anything.
+    made(["convert", "wall.obj", "--projection", "orthographic"] + few, "parallel.exr", 0)
+    with open(os.path.join(folder, "points.obj"), "w") as out, open(os.path.join(folder, "wall.obj")) as of:
+        out.writelines(line for line in of if line[0] == "v")
+    made(["convert", "points.obj"] + few, "points.exr", 0)
+    harness.must([stx, "extract", "few.exr", "-o", "set", "--quiet"], folder)
+    made(["convert", "set"], "of_set.exr", 5)
+    made(["convert", "set", "--no-depth", "unknown"], "captured.exr", 0)
     return wrong
 
 
@@ -122,8 +169,10 @@ def main():
         cameras(folder, "path.json", PICTURES, 1, LENGTH - 1, 128)
         harness.must([args.stx, "convert", "wall.obj", "-o", "views.exr", "--views", "views.json", "--quiet"], folder,
                      timeout=600)
-        harness.must([args.stx, "refine", "views.exr", "-o", "refined.exr", "--quiet"], folder)
-        wrong = check_shards(args.stx, folder) + check_lies(args.stx, folder)
+        found = len(summaries(read(folder, "views.exr")))
+        wrong = [] if found == VIEWS else [f"{found} summaries, {VIEWS} are expected"]
+        without_summaries(folder, "views.exr", "plain.exr")
+        wrong += check_shards(args.stx, folder) + check_lies(args.stx, folder) + check_writers(args.stx, folder)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     for line in wrong:

@@ -7,6 +7,7 @@
 #include "lib/geometry/view_layout.hpp"
 #include "lib/metrics/compare.hpp"
 #include "lib/packing/packing.hpp"
+#include "lib/packing/views_one_by_one.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/spheres_miv.hpp"
 #include "tests/torus_bundle.hpp"
@@ -175,6 +176,80 @@ TEST(Prune, AThousandTinyViews) {
     ASSERT_TRUE(report) << report.error().text();
     EXPECT_EQ(report->keptPixels, bundle.pointCount());
     EXPECT_TRUE(bundle.check());
+}
+
+TEST(Prune, ViewsOneByOneAreThoseOfABundle) {
+    const Bundle whole = torusViews(96);
+    for (const bool linear : {false, true}) {
+        Bundle before = whole;
+        // A gap, so that blocks without points have neighbours with some.
+        for (int x = 30; x < 60; ++x) before.views[2].depth.at(x, 40) = kNoDepth;
+        if (linear)
+            for (ReferenceView& view : before.views) {
+                RgbaFloatImage colour(96, 96);
+                for (std::size_t k = 0; k < colour.count(); ++k)
+                    colour.data()[k] = view.texture.at(k);
+                view.texture = std::move(colour);
+            }
+        Job job;
+        Bundle after = before;
+        PruneSettings settings;
+        settings.overlap = 1;
+        const auto report = prune(after, settings, job);
+        ASSERT_TRUE(report);
+        auto pruning = findPruning(*viewsOf(before), settings, job);
+        ASSERT_TRUE(pruning);
+        EXPECT_EQ(pruning->report.keptPixels, report->keptPixels);
+        EXPECT_EQ(pruning->report.psnr, report->psnr);
+        EXPECT_LT(report->keptPixels, report->sourcePixels);
+        const auto table = prunedViews(tableOf(before), std::move(*pruning));
+        for (std::size_t i = 0; i < before.views.size(); ++i) {
+            const auto view = table->view(i, job);
+            ASSERT_TRUE(view) << view.error().text();
+            EXPECT_EQ((*view)->pruned, after.views[i].pruned);
+            EXPECT_EQ((*view)->depth, after.views[i].depth);
+            EXPECT_TRUE((*view)->texture == after.views[i].texture);
+        }
+        PackSettings tight;
+        tight.layout = PackSettings::Layout::tight;
+        const auto a = pack(*table, tight, job), b = pack(after, tight, job);
+        ASSERT_TRUE(a && b);
+        EXPECT_EQ(a->pages[0].depth, b->pages[0].depth);
+        EXPECT_TRUE(a->pages[0].texture == b->pages[0].texture);
+        EXPECT_EQ(a->keptPixels, b->keptPixels);
+        EXPECT_EQ(a->sourcePixels, b->sourcePixels);
+    }
+}
+
+/// Views of which one turns out to be other than its header.
+class ViewsThatLie : public ViewTable {
+  public:
+    explicit ViewsThatLie(Bundle bundle)
+        : ViewTable(bundle, std::vector<ViewImageKinds>(bundle.views.size())),
+          bundle_(std::move(bundle)) {
+        for (ReferenceView& view : about().views) view.texture = {}, view.depth = {};
+    }
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job&) const override {
+        auto view = std::make_shared<ReferenceView>(bundle_.views[index]);
+        if (index == 3) view->farPlane *= 2;
+        return view;
+    }
+
+  private:
+    Bundle bundle_;
+};
+
+TEST(Prune, ViewsThatAreNotThoseOfTheirHeadersAreErrors) {
+    const ViewsThatLie table(torusViews(48));
+    Job job;
+    const auto pruning = findPruning(table, {}, job);
+    ASSERT_FALSE(pruning);
+    EXPECT_EQ(pruning.error().where, "view 3");
+    const auto atlas = pack(table, {}, job);
+    ASSERT_FALSE(atlas);
+    EXPECT_EQ(atlas.error().where, "view 3");
 }
 
 TEST(Prune, SameOnAnyNumberOfThreads) {

@@ -31,12 +31,10 @@ ReferenceView wallFrom(double x, int side = kSide, double fov = 0.8) {
 }
 
 std::vector<PruneView> prepared(const Bundle& bundle, const std::vector<int>& rank) {
-    std::vector<DepthSurface> surfaces;
-    for (const auto& view : bundle.views) surfaces.push_back(depthSurface(view, {}));
-    Job job;
-    auto views = preparePruning(bundle, rank, std::move(surfaces), job);
-    EXPECT_TRUE(views);
-    return std::move(*views);
+    std::vector<PruneView> views;
+    for (const auto& view : bundle.views) views.push_back(preparePruning(view));
+    findPartners(views, rank);
+    return views;
 }
 
 Replacement findIn(const std::vector<PruneView>& views, std::size_t to, glm::ivec2 at) {

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "lib/base/image.hpp"
+#include "lib/model/view_table.hpp"
+#include "lib/packing/packing.hpp"
+#include "lib/packing/prune.hpp"
+
+namespace stx {
+
+/// As pack() of a bundle, of views that are looked at one by one, once, in the tight layout twice.
+[[nodiscard]] Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& job);
+
+/// What pruning keeps of each view.
+struct Pruning {
+    PruneReport report;
+    std::vector<Image<std::uint8_t>> kept;  ///< 1 = a point that stays
+    std::vector<bool> changed;              ///< some point goes
+};
+/// What prune() does, of views that are looked at one by one, once. What is looked at of their
+/// points stays in memory meanwhile: 21 bytes for each pixel of the blocks of 16x16 that have some
+/// (33 where colour is linear), and one or two for each pixel.
+[[nodiscard]] Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& settings,
+                                          Job& job);
+/// The views without what goes, each when it is asked for.
+[[nodiscard]] std::unique_ptr<ViewTable> prunedViews(std::unique_ptr<ViewTable> table,
+                                                     Pruning pruning);
+
+}  // namespace stx
