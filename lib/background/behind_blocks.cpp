@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "lib/background/behind_layer.hpp"
 #include "lib/base/parallel.hpp"
@@ -16,6 +17,9 @@ constexpr float kUncovered = 1.5f;
 constexpr int kMixedPixels = 3;
 /// How much nearer, pixels of parallax: a surface may be steep.
 constexpr float kMixedJump = 3.0f;
+/// Deviations of the means that fine and coarse detail are differences from, blocks: what is
+/// coarser than the second is in the smooth colours.
+constexpr int kFine = 1, kCoarse = 20;
 constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
 float parallaxOf(float depth, float scale) {
@@ -135,18 +139,92 @@ void markMixed(Layer& layer) {
     }
 }
 
-/// What is at the edges of the photograph goes on outwards.
+/// Of a row of values those that are smaller than all within `radius`, each as far as it reaches:
+/// near things that are narrower than twice that are gone (a grey opening).
+std::vector<float> withoutNarrow(std::vector<float> row, int radius) {
+    const auto sweep = [&](const auto& better) {
+        for (int pass = 0; pass < radius; ++pass) {
+            float before = row[0];
+            for (std::size_t i = 0; i < row.size(); ++i) {
+                const float own = row[i], after = row[std::min(i + 1, row.size() - 1)];
+                row[i] = better(own, better(before, after));
+                before = own;
+            }
+        }
+    };
+    sweep([](float a, float b) { return std::min(a, b); });
+    sweep([](float a, float b) { return std::max(a, b); });
+    return row;
+}
+
+/// What is at one side of the photograph goes on outwards for `reach` blocks: near things as far as
+/// half of their width, which is all that is known of how long they are.
+void continueSide(Layer& layer, glm::ivec2 corner, glm::ivec2 along, glm::ivec2 outwards, int count,
+                  int reach) {
+    std::vector<float> rim(static_cast<std::size_t>(count));
+    for (int i = 0; i < count; ++i) {
+        const glm::ivec2 at = corner + i * along;
+        rim[static_cast<std::size_t>(i)] = layer.front.at(at.x, at.y);
+    }
+    parallelFor(1, reach + 1, [&](std::int64_t out) {
+        const int d = static_cast<int>(out);
+        const std::vector<float> row = withoutNarrow(rim, d);
+        // The corners belong to the side above or below.
+        const int more = along.x != 0 ? layer.border.x : 0;
+        for (int i = -more; i < count + layer.width(); ++i) {
+            const glm::ivec2 at = corner + i * along + d * outwards;
+            if (!layer.part.contains(at.x, at.y)) break;
+            if (along.y != 0 && i >= count) break;
+            const float p = row[static_cast<std::size_t>(std::clamp(i, 0, count - 1))];
+            layer.part.at(at.x, at.y) = p < 0 ? Part::shown : Part::around;
+            layer.front.at(at.x, at.y) = layer.far.at(at.x, at.y) = layer.parallax.at(at.x, at.y) =
+                p;
+        }
+    });
+}
+
 void continueAround(Layer& layer) {
     const glm::ivec2 first = layer.border, last = layer.border + layer.photo - 1;
-    for (int y = 0; y < layer.height(); ++y) {
-        for (int x = 0; x < layer.width(); ++x) {
-            if (layer.inPhoto(x, y)) continue;
-            const float p =
-                layer.front.at(std::clamp(x, first.x, last.x), std::clamp(y, first.y, last.y));
-            layer.part.at(x, y) = p < 0 ? Part::shown : Part::around;
-            layer.front.at(x, y) = layer.far.at(x, y) = layer.parallax.at(x, y) = p;
+    const glm::ivec2 size = layer.part.size();
+    continueSide(layer, first, {1, 0}, {0, -1}, layer.photo.x, first.y);
+    continueSide(layer, {first.x, last.y}, {1, 0}, {0, 1}, layer.photo.x, size.y - 1 - last.y);
+    continueSide(layer, first, {0, 1}, {-1, 0}, layer.photo.y, first.x);
+    continueSide(layer, {last.x, first.y}, {0, 1}, {1, 0}, layer.photo.y, size.x - 1 - last.x);
+}
+
+/// Means of the photograph's colours around each block, of what is at one depth, weighted by a bell
+/// curve of that deviation.
+Image<glm::vec3> smoothShown(const Layer& layer, int deviation) {
+    const int w = layer.width(), h = layer.height();
+    Image<glm::vec3> across(w, h, glm::vec3(0)), out(w, h, glm::vec3(0));
+    std::vector<float> weightOf;
+    for (int k = 0; k <= 2 * deviation; ++k)
+        weightOf.push_back(std::exp(-0.5f * static_cast<float>(k * k) /
+                                    static_cast<float>(deviation * deviation)));
+    const auto mean = [&](const Image<glm::vec3>& of, int x, int y, glm::ivec2 step) {
+        const float own = layer.front.at(x, y);
+        glm::vec3 sum(0);
+        float weights = 0;
+        for (int k = -2 * deviation; k <= 2 * deviation; ++k) {
+            const int u = x + k * step.x, v = y + k * step.y;
+            if (!layer.inPhoto(u, v) || std::abs(layer.front.at(u, v) - own) > 2 * kOneSurface)
+                continue;
+            const float weight = weightOf[static_cast<std::size_t>(std::abs(k))];
+            weights += weight;
+            sum += weight * of.at(u, v);
         }
-    }
+        return sum / weights;
+    };
+    const auto pass = [&](const Image<glm::vec3>& from, Image<glm::vec3>& to, glm::ivec2 step) {
+        parallelFor(0, layer.photo.y, [&](std::int64_t row) {
+            const int y = static_cast<int>(row) + layer.border.y;
+            for (int x = layer.border.x; x < layer.border.x + layer.photo.x; ++x)
+                to.at(x, y) = mean(from, x, y, step);
+        });
+    };
+    pass(layer.shown, across, {1, 0});
+    pass(across, out, {0, 1});
+    return out;
 }
 
 }  // namespace
@@ -170,6 +248,8 @@ Layer blocksOf(const ReferenceView& view, double scale, int step, glm::ivec2 bor
     }
     markMixed(layer);
     continueAround(layer);
+    layer.smooth = smoothShown(layer, kFine);
+    layer.base = smoothShown(layer, kCoarse);
     return layer;
 }
 

@@ -30,6 +30,8 @@ struct Layer {
     Image<float> parallax;
     /// Means of the photograph's pixels; around it nothing.
     Image<glm::vec3> shown;
+    /// The same without fine, and without any detail: means of what is around at one depth.
+    Image<glm::vec3> smooth, base;
     /// Colour behind, of the blocks that `parallax` has.
     Image<glm::vec3> colour;
 
