@@ -364,7 +364,7 @@ void addBehindOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
     c.option("--shift", o->behind.shiftPercent,
              "How far to the side an eye may go without a hole, percent of the median distance "
              "(default 8)")
-        .positive()
+        .range(0.001, kMostBehindPercent)
         .takes("PERCENT")
         .group("Bundles of one photograph");
 }

@@ -18,6 +18,8 @@ using namespace behind;
 /// The longer side of the photograph in blocks at most: what is invented has no more detail of its
 /// own than this; fine detail is copied at full size. Time and memory grow with its square.
 constexpr int kMostBlocks = 1300;
+/// Memory of a block while sources are looked for: that of Layer, and of the finest level twice.
+constexpr std::uint64_t kBytesPerBlock = 240;
 /// Pixels of the border beyond what the eye can see, for the half pixels of drawing.
 constexpr double kBorderMargin = 4;
 /// Share of the pixels at an edge of the frame whose parallax the border is wide enough for; single
@@ -89,6 +91,12 @@ Result<BehindPhoto> behindPhoto(const ReferenceView& view, const BehindSettings&
     const int step = (std::max(w, h) + kMostBlocks - 1) / kMostBlocks;
     BehindPhoto out;
     out.border = borderOf(view, scale, median, step);
+    const std::uint64_t larger = static_cast<std::uint64_t>(w + 2 * out.border.x) *
+                                 static_cast<std::uint64_t>(h + 2 * out.border.y);
+    const auto blocks = static_cast<std::uint64_t>(step) * static_cast<std::uint64_t>(step);
+    STX_CHECK(job.limits.checkAllocation(
+        larger, kBytesPerBlock / blocks + (view.texture.isLinear() ? 20 : 8),
+        "what a photograph hides"));
 
     Layer layer = blocksOf(view, scale, step, out.border);
     STX_CHECK(job.checkCancelled());
