@@ -27,7 +27,7 @@ void addBehindOption(const Command& command, PhotoSetOptions& options, const cha
              STX_TRY(const auto percent, parseNumbers(text, 1, "--behind"));
              if (!(percent[0] > 0 && percent[0] <= kMostBehindPercent))
                  return fail(ErrorCode::usage,
-                             "--behind is {}; none or a number above 0 and up to {:g} is expected",
+                             "it is {}; none or a number above 0 and up to {:g} is expected",
                              text, kMostBehindPercent);
              options.behindPercent = percent[0];
              return {};

@@ -144,7 +144,8 @@ Result<AddedBehind> addBehind(Bundle& bundle, const BehindSettings& settings, Jo
                     "it has {} views of one moment; what is behind is invented for one photograph "
                     "(a film shows it, and other views do)",
                     photos);
-    std::erase_if(bundle.views, isBackground);
+    if (std::erase_if(bundle.views, isBackground) > 0 && bundle.bounds)
+        bundle.bounds = bundle.computeBounds();
     const ReferenceView& photo = bundle.views.front();
     STX_TRY(BehindPhoto behind, behindPhoto(photo, settings, job));
     AddedBehind added;
