@@ -229,14 +229,15 @@ Image<glm::vec3> smoothShown(const Layer& layer, int deviation) {
 
 }  // namespace
 
-Layer blocksOf(const ReferenceView& view, double scale, int step, glm::ivec2 border) {
+Layer blocksOf(const ReferenceView& view, double scale, int step, glm::ivec2 border,
+               glm::ivec2 size) {
     const auto blocks = [step](int pixels) { return (pixels + step - 1) / step; };
     const int w = view.depth.width(), h = view.depth.height();
     Layer layer;
     layer.step = step;
     layer.border = border / step;
     layer.photo = {blocks(w), blocks(h)};
-    const int width = blocks(w + 2 * border.x), height = blocks(h + 2 * border.y);
+    const int width = blocks(size.x), height = blocks(size.y);
     layer.part = Image<Part>(width, height, Part::shown);
     layer.front = layer.far = layer.parallax = Image<float>(width, height, kNoParallax);
     layer.shown = layer.colour = Image<glm::vec3>(width, height, glm::vec3(0));

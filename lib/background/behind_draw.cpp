@@ -93,12 +93,12 @@ std::optional<glm::ivec2> blockToDraw(const Layer& layer, const Image<std::uint8
 }
 
 /// Writes a colour of the texture's own space.
-void put(Texture& texture, int x, int y, glm::vec3 colour) {
+void put(Texture& texture, int x, int y, glm::vec3 colour, bool covered = true) {
     if (auto* bytes = texture.rgba8()) {
         const glm::vec3 coded = glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f;
-        bytes->at(x, y) = glm::u8vec4(glm::u8vec3(coded), 255);
+        bytes->at(x, y) = glm::u8vec4(glm::u8vec3(coded), covered ? 255 : 0);
     } else {
-        texture.rgbaFloat()->at(x, y) = glm::vec4(glm::max(colour, 0.0f), 1.0f);
+        texture.rgbaFloat()->at(x, y) = glm::vec4(glm::max(colour, 0.0f), covered ? 1.0f : 0.0f);
     }
 }
 
@@ -111,6 +111,16 @@ glm::vec3 smoothAt(const Layer& layer, const Image<glm::vec3>& smooth, int x, in
     const float fx = bx - static_cast<float>(x0), fy = by - static_cast<float>(y0);
     return glm::mix(glm::mix(smooth.at(x0, y0), smooth.at(x0 + 1, y0), fx),
                     glm::mix(smooth.at(x0, y0 + 1), smooth.at(x0 + 1, y0 + 1), fx), fy);
+}
+
+/// Colours of blocks, and under what is not drawn those of the nearest that are (bleedColour()).
+Texture bledColours(const Layer& layer, const Image<std::uint8_t>& drawn) {
+    RgbaFloatImage colours(layer.width(), layer.height());
+    for (std::size_t i = 0; i < colours.count(); ++i)
+        colours.data()[i] = glm::vec4(layer.colour.data()[i], drawn.data()[i] != 0 ? 1.0f : 0.0f);
+    Texture out = std::move(colours);
+    bleedColour(out);
+    return out;
 }
 
 /// What detail a pixel gets of a block's source.
@@ -133,6 +143,7 @@ glm::vec3 detailAt(const Layer& layer, const Sources& sources, const ReferenceVi
 std::int64_t drawBehind(const Layer& layer, const Sources& sources, const ReferenceView& photo,
                         double scale, ReferenceView& out) {
     const Image<std::uint8_t> drawn = drawnBlocks(layer);
+    const Texture bled = bledColours(layer, drawn);
     const int w = out.depth.width();
     const glm::ivec2 border = layer.border * layer.step;
     std::vector<std::int64_t> hidden(static_cast<std::size_t>(out.depth.height()), 0);
@@ -140,9 +151,12 @@ std::int64_t drawBehind(const Layer& layer, const Sources& sources, const Refere
         const int y = static_cast<int>(row);
         for (int x = 0; x < w; ++x) {
             const auto block = blockToDraw(layer, drawn, photo.depth.size(), x, y);
-            if (!block) continue;
-            const Sample sample = sampleAt(layer, *block, x, y);
-            if (!(sample.parallax > 0)) continue;
+            const Sample sample = block ? sampleAt(layer, *block, x, y) : Sample();
+            if (!(sample.parallax > 0)) {
+                const int step = layer.step;
+                put(out.texture, x, y, glm::vec3(bled.at(x / step, y / step)), false);
+                continue;
+            }
             float depth = static_cast<float>(scale / sample.parallax);
             const int u = x - border.x, v = y - border.y;
             if (photo.depth.contains(u, v)) {

@@ -20,7 +20,7 @@ enum class Part : std::uint8_t {
 /// The larger picture in blocks of step x step pixels, the first one at its upper left corner.
 struct Layer {
     int step = 1;
-    glm::ivec2 border{0};  ///< blocks at the left, and above; at the right and below as many pixels
+    glm::ivec2 border{0};  ///< blocks at the left, and above
     glm::ivec2 photo{0};   ///< size of the photograph in blocks, those cut by its edge included
     Image<Part> part;
     /// Of the photograph, the nearest and the farthest pixel of each block; around it what is
@@ -61,8 +61,10 @@ inline constexpr float kOneSurfaceOfJump = 0.25f;
 }
 
 /// The blocks of a view, with the parts and all that the photograph says; nothing is invented yet.
-/// `scale`: parallax times distance; `border`: pixels, multiples of `step`.
-[[nodiscard]] Layer blocksOf(const ReferenceView& view, double scale, int step, glm::ivec2 border);
+/// `scale`: parallax times distance; `border`: pixels at the left and above, multiples of `step`;
+/// `size`: of the larger picture, pixels.
+[[nodiscard]] Layer blocksOf(const ReferenceView& view, double scale, int step, glm::ivec2 border,
+                             glm::ivec2 size);
 
 /// Gives hidden blocks a depth: that of the nearest block beside them that is behind them, made
 /// smooth. Blocks that nothing behind reaches become `shown`. Colours of mixed blocks are then the

@@ -61,6 +61,28 @@ glm::ivec2 borderOf(const ReferenceView& view, double scale, double median, int 
     return {side(across, w, camera.fx), side(down, h, camera.fy)};
 }
 
+/// The larger picture: pixels at the left and above, and its size. The principal point comes into
+/// its middle, to half a pixel, where that takes no more than kMostBorder: containers that know no
+/// other would have to make it larger themselves.
+struct Frame {
+    glm::ivec2 border, size;
+};
+Frame frameOf(const ReferenceView& view, glm::ivec2 border, int step) {
+    const glm::dvec2 principal(view.camera.cx, view.camera.cy);
+    Frame frame{border, view.depth.size()};
+    for (int k = 0; k < 2; ++k) {
+        int more = static_cast<int>(std::lround(2 * principal[k])) - frame.size[k];
+        if (std::abs(more) > kMostBorder * frame.size[k]) more = 0;
+        int after = border[k] + more;
+        if (more < 0) {
+            frame.border[k] += (-more + step - 1) / step * step;
+            after = frame.border[k] + more;
+        }
+        frame.size[k] += frame.border[k] + after;
+    }
+    return frame;
+}
+
 Result<void> checkPhoto(const ReferenceView& view, const BehindSettings& settings) {
     STX_CHECK(view.check());
     if (!(settings.shiftPercent > 0 && settings.shiftPercent <= kMostBehindPercent))
@@ -87,18 +109,17 @@ Result<BehindPhoto> behindPhoto(const ReferenceView& view, const BehindSettings&
     const double median =
         std::max(view.camera.fx, view.camera.fy) * settings.shiftPercent / 100;  // parallax
     const double scale = median * distance;
-    const int w = view.depth.width(), h = view.depth.height();
-    const int step = (std::max(w, h) + kMostBlocks - 1) / kMostBlocks;
-    BehindPhoto out;
-    out.border = borderOf(view, scale, median, step);
-    const std::uint64_t larger = static_cast<std::uint64_t>(w + 2 * out.border.x) *
-                                 static_cast<std::uint64_t>(h + 2 * out.border.y);
+    const int step =
+        (std::max(view.depth.width(), view.depth.height()) + kMostBlocks - 1) / kMostBlocks;
+    const Frame frame = frameOf(view, borderOf(view, scale, median, step), step);
+    const std::uint64_t larger =
+        static_cast<std::uint64_t>(frame.size.x) * static_cast<std::uint64_t>(frame.size.y);
     const auto blocks = static_cast<std::uint64_t>(step) * static_cast<std::uint64_t>(step);
     STX_CHECK(job.limits.checkAllocation(
         larger, kBytesPerBlock / blocks + (view.texture.isLinear() ? 20 : 8),
         "what a photograph hides"));
 
-    Layer layer = blocksOf(view, scale, step, out.border);
+    Layer layer = blocksOf(view, scale, step, frame.border, frame.size);
     STX_CHECK(job.checkCancelled());
     inventDepth(layer);
     STX_CHECK(job.checkCancelled());
@@ -107,14 +128,18 @@ Result<BehindPhoto> behindPhoto(const ReferenceView& view, const BehindSettings&
     const Sources sources = findSources(layer);
     STX_CHECK(job.checkCancelled());
 
+    layer.far = {};
+    layer.shown = {};
+    BehindPhoto out;
+    out.border = frame.border;
     static_cast<ViewHeader&>(out.view) = view;
     out.view.colourFile = {};
     out.view.background = true;
     out.view.noDepth = NoDepth::empty;
     out.view.pruned = false;
     Camera& camera = out.view.camera;
-    camera.width += 2 * out.border.x;
-    camera.height += 2 * out.border.y;
+    camera.width = frame.size.x;
+    camera.height = frame.size.y;
     camera.cx += out.border.x;
     camera.cy += out.border.y;
     out.view.depth = Image<float>(camera.width, camera.height, kNoDepth);
@@ -123,7 +148,6 @@ Result<BehindPhoto> behindPhoto(const ReferenceView& view, const BehindSettings&
     else
         out.view.texture = Rgba8Image(camera.width, camera.height, glm::u8vec4(0));
     out.hidden = drawBehind(layer, sources, view, scale, out.view);
-    bleedColour(out.view.texture);
     fitDepthRange(out.view);
     return out;
 }

@@ -20,10 +20,11 @@ struct BehindSettings {
 
 struct BehindPhoto {
     /// Colour and depth; marked as ReferenceView::background. The photograph's pose and focal
-    /// length, larger by the border on all sides. Pixels where nothing was invented are empty:
+    /// length, larger by the border on all sides, a little wider where that puts the principal
+    /// point into the middle. Pixels where nothing was invented are empty:
     /// alpha 0, kNoDepth.
     ReferenceView view;
-    glm::ivec2 border{0};     ///< pixels at each side, and above and below
+    glm::ivec2 border{0};     ///< pixels at the left, and above
     std::int64_t hidden = 0;  ///< pixels inside of the photograph's frame that were invented
 };
 
