@@ -27,8 +27,8 @@ void addBehindOption(const Command& command, PhotoSetOptions& options, const cha
              STX_TRY(const auto percent, parseNumbers(text, 1, "--behind"));
              if (!(percent[0] > 0 && percent[0] <= kMostBehindPercent))
                  return fail(ErrorCode::usage,
-                             "it is {}; none or a number above 0 and up to {:g} is expected",
-                             text, kMostBehindPercent);
+                             "it is {}; none or a number above 0 and up to {:g} is expected", text,
+                             kMostBehindPercent);
              options.behindPercent = percent[0];
              return {};
          },
