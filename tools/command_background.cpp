@@ -4,11 +4,13 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/any/open.hpp"
+#include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/video/video_frames.hpp"
+#include "lib/background/behind_photo.hpp"
 #include "lib/background/sequence_background.hpp"
 #include "lib/background/still.hpp"
 #include "lib/base/stopwatch.hpp"
@@ -23,6 +25,7 @@ struct BackgroundOptions {
     std::string method = "select";
     StillSettings settings;
     TemporalBackgroundSettings temporal;
+    BehindSettings behind;
     std::string video;
     std::optional<int> crf;
     bool strict = false;
@@ -127,8 +130,53 @@ bool holdsVideo(const std::string& input, const Job& job) {
     return document && mpeg4::holdsVideo(*document);
 }
 
+/// Whether one bundle becomes another, and not frames a picture.
+bool isBundle(const BackgroundOptions& o) {
+    const std::string ending = std::filesystem::path(o.output).extension().string();
+    if (o.inputs.size() != 1 || (ending != ".exr" && ending != ".EXR")) return false;
+    const auto kind = recognise(o.inputs[0]);
+    return kind && (*kind == FileKind::mpeg4 || *kind == FileKind::exr ||
+                    *kind == FileKind::atlas || *kind == FileKind::photo);
+}
+
+/// What one photograph hides, invented, as a view of its bundle.
+Result<int> behindOfStill(const BackgroundOptions& o, const Command& command, Sequence& frames,
+                          const Stopwatch& watch, Program& program) {
+    const std::string where = fmt::format("'{}'", o.inputs[0]);
+    STX_CHECK(command.refuse({"--key-views", "--video", "--crf"},
+                             fmt::format("is of films, and {} has one frame", where)));
+    STX_TRY(Bundle bundle, frames.frame(0, program.job));
+    const auto added = addBehind(bundle, o.behind, program.job);
+    if (!added) return tl::unexpected(added.error().at(where));
+    program.job.note(added->note(o.behind));
+    SaveOptions save;
+    save.noClobber = program.common.noClobber;
+    STX_CHECK(saveBundle(bundle, o.output, save, program.job));
+    const double seconds = watch.seconds();
+    program.sayNotes();
+    program.say(fmt::format("{} → {} ({}), {} of 1 photograph, {}",
+                            std::filesystem::path(o.inputs[0]).filename().string(),
+                            std::filesystem::path(o.output).filename().string(),
+                            humanBytes(bytesOf(o.output)), counted(1, "background"),
+                            humanSeconds(seconds)));
+    STX_CHECK(program.writeReport(
+        {{"$schema", "background-report.schema.json"},
+         {"inputs", o.inputs},
+         {"output", o.output},
+         {"method", "invented"},
+         {"frames", 1},
+         {"views",
+          nlohmann::ordered_json::array({{{"name", added->name},
+                                          {"seen", added->seen},
+                                          {"hidden", added->hidden},
+                                          {"border", {added->border.x, added->border.y}}}})},
+         {"seconds", seconds}}));
+    return 0;
+}
+
 /// What the cameras of a bundle with time see behind all that moves, as views of the bundle.
-Result<int> backgroundOfBundle(const BackgroundOptions& o, Program& program) {
+Result<int> backgroundOfBundle(const BackgroundOptions& o, const Command& command,
+                               Program& program) {
     const Stopwatch watch;
     if (o.inputs.size() != 1)
         return fail(ErrorCode::usage, "{} inputs for '{}'; one bundle with time is expected",
@@ -138,9 +186,12 @@ Result<int> backgroundOfBundle(const BackgroundOptions& o, Program& program) {
     OpenOptions open;
     open.set.strict = o.strict;
     STX_TRY(auto frames, openSequence(o.inputs[0], open.into(o.output), program.job));
-    if (!frames->timeline().moves())
-        return failAt(fmt::format("'{}'", o.inputs[0]), ErrorCode::invalidInput,
-                      "it has one frame; a background is found in what others uncover");
+    if (frames->timeline().moves() && !holdsSequences(o.output))
+        return fail(ErrorCode::usage,
+                    "'{}' moves, and '{}' holds one frame; .mp4 and name_%04d.exr hold more",
+                    o.inputs[0], o.output);
+    if (!frames->timeline().moves()) return behindOfStill(o, command, *frames, watch, program);
+    STX_CHECK(command.refuse({"--shift"}, "is of one photograph; a film shows what is behind"));
     auto found = rememberBackgrounds(
         frames->timeline().times,
         [&](std::size_t frame, Job& job) { return frames->frame(frame, job); }, o.temporal,
@@ -238,16 +289,17 @@ Result<int> background(const BackgroundOptions& o, const Command& command, Progr
                                  "is of --method select"));
     if (o.maskOf.empty())
         STX_CHECK(command.refuse({"--mask-output"}, "is of masks; give --mask-of, too"));
-    if (holdsSequences(o.output)) {
+    if (holdsSequences(o.output) || isBundle(o)) {
         STX_CHECK(
             command.refuse({"--method", "--frames", "--confidence", "--mask-of", "--mask-output",
                             "--quietest", "--window", "--adaptive", "--drift"},
                            "is of plain video, whose background is a picture"));
         if (o.video.empty())
             STX_CHECK(command.refuse({"--crf"}, "is of video; give --video h264, too"));
-        return backgroundOfBundle(o, program);
+        return backgroundOfBundle(o, command, program);
     }
     STX_CHECK(command.refuse({"--key-views", "--video", "--crf"}, "is of bundles with time"));
+    STX_CHECK(command.refuse({"--shift"}, "is of a bundle of one photograph"));
     return backgroundOfFrames(o, program);
 }
 
@@ -307,6 +359,16 @@ void addFilmOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
         .group(films);
 }
 
+/// Of bundles of one photograph.
+void addBehindOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
+    c.option("--shift", o->behind.shiftPercent,
+             "How far to the side an eye may go without a hole, percent of the median distance "
+             "(default 8)")
+        .range(0.001, kMostBehindPercent)
+        .takes("PERCENT")
+        .group("Bundles of one photograph");
+}
+
 }  // namespace
 
 void addBackground(CommandLine& line, Program& program) {
@@ -317,17 +379,19 @@ void addBackground(CommandLine& line, Program& program) {
                          "  stx background frames/ -o background.png\n"
                          "  stx background frame_%04d.png -o background.png --method n2pg\n"
                          "  stx background hall.y4m -o background.png --mask-of all\n"
-                         "  stx background film.mp4 -o film_with_background.mp4");
+                         "  stx background film.mp4 -o film_with_background.mp4\n"
+                         "  stx background photo.mp4 -o photo_with_background.mp4 --shift 12");
     auto o = std::make_shared<BackgroundOptions>();
     c.option("FRAMES", o->inputs,
              "Pictures in the order of time, a folder of numbered pictures, their names as "
              "frame_%04d.png, or a .y4m file; or a bundle with time (.mp4, an image set, "
-             "name_%04d.exr)")
+             "name_%04d.exr), or of one photograph")
         .required();
     c.option("-o,--output", o->output,
              "Picture to write (.png, .jpg, .tif, .webp, .exr); of a bundle with time: it with a "
              "background view for each still camera, and for a few poses of those that move (.mp4, "
-             ".xmt, .bt, name_%04d.exr)")
+             ".xmt, .bt, name_%04d.exr); of a bundle of one photograph: it with a view of what it "
+             "hides (.exr, too)")
         .required()
         .takes("IMAGE");
     c.option(
@@ -354,6 +418,7 @@ void addBackground(CommandLine& line, Program& program) {
     addMaskOptions(c, o);
     addSelectOptions(c, o);
     addFilmOptions(c, o);
+    addBehindOptions(c, o);
     c.sharedOptions(program.common, kOutput | kPictures);
     c.runs([o, c](Program& p) { return background(*o, c, p); });
 }

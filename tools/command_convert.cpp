@@ -623,6 +623,7 @@ void addConvert(CommandLine& line, Program& program) {
     addSetCameras(c, o);
     addSetFiles(c, o);
     addPhotoOptions(c, o->open.set.photo, kSetHeading);
+    addBehindOption(c, o->open.set.photo, kSetHeading);
     addImportRefining(c, o->refining, kSetHeading);
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);

@@ -11,6 +11,7 @@
 #include "formats/imagesets/motion.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/imagesets/recognise.hpp"
+#include "lib/background/behind_photo.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/origin.hpp"
 #include "lib/model/sequence.hpp"
@@ -247,6 +248,11 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
     for (const RefineReport& ofView : reports) report.add(ofView);
     STX_CHECK(attendToPoses(bundle, options, report, job));
     if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));
+    if (set.photo && options.photo.behindPercent > 0) {
+        const BehindSettings settings{options.photo.behindPercent};
+        STX_TRY(const AddedBehind added, within(where, addBehind(bundle, settings, job)));
+        job.note(added.note(settings) + "; --behind none leaves it out");
+    }
     if (options.refined) options.refined(report);
     return bundle;
 }

@@ -28,6 +28,9 @@ struct PhotoSetOptions {
     NearIs nearIs = NearIs::unknown;
     bool portrait = false;  ///< the blurred picture, where the file has a sharp one, too
     double fovRad = 0;      ///< vertical, of the upright picture; 0 = as the file tells
+    /// A background view of what is hidden is invented (addBehind()), for eyes that go as many
+    /// percent of the median distance to the side; 0: none is.
+    double behindPercent = 0;
 };
 
 struct ImageSetOptions {

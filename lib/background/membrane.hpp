@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx::behind {
+
+/// Unknown values between known ones: the smoothest that fit, each the mean of its neighbours.
+/// Solved by successive over-relaxation, the two colours of a chessboard in turn, so that any
+/// number of threads gives the same bytes.
+template <class Value>
+struct Membrane {
+    struct Unknown {
+        std::array<std::int32_t, 4> to{-1, -1, -1, -1};  ///< unknown neighbours; -1: none
+        Value known{};                                   ///< sum of known neighbours
+        float count = 0;                                 ///< neighbours of both kinds
+    };
+    std::array<std::vector<std::int32_t>, 2> turn;  ///< numbers of the white and the black fields
+    std::vector<Unknown> unknowns;
+    std::vector<Value> values;  ///< the first guess, then what was found
+
+    void add(const Unknown& unknown, const Value& guess, bool black) {
+        turn[black].push_back(static_cast<std::int32_t>(unknowns.size()));
+        unknowns.push_back(unknown);
+        values.push_back(guess);
+    }
+
+    /// `relaxation`: 1 to below 2, the nearer to 2, the farther a round carries.
+    void solve(int rounds, float relaxation) {
+        constexpr std::int64_t kGrain = 1 << 13;
+        for (int round = 0; round < 2 * rounds; ++round) {
+            const auto& fields = turn[round % 2];
+            parallelForBlocks(0, static_cast<std::int64_t>(fields.size()), kGrain,
+                              [&](std::int64_t from, std::int64_t to) {
+                                  for (std::int64_t i = from; i < to; ++i) {
+                                      const std::int32_t at = fields[static_cast<std::size_t>(i)];
+                                      const Unknown& u = unknowns[static_cast<std::size_t>(at)];
+                                      if (!(u.count > 0)) continue;
+                                      Value sum = u.known;
+                                      for (const std::int32_t n : u.to)
+                                          if (n >= 0) sum += values[static_cast<std::size_t>(n)];
+                                      Value& value = values[static_cast<std::size_t>(at)];
+                                      value += relaxation * (sum / u.count - value);
+                                  }
+                              });
+        }
+    }
+};
+
+}  // namespace stx::behind
