@@ -25,8 +25,9 @@ void subtractPaeth(const std::uint8_t* row, const std::uint8_t* above, std::size
     const auto between = [](std::uint8_t a, std::uint8_t b) {
         return static_cast<std::uint8_t>(std::max(a, b) - std::min(a, b));
     };
+    const std::uint8_t *left = row - step, *aboveLeft = above - step;
     for (std::size_t i = 0; i < size; ++i) {
-        const std::uint8_t a = row[i - step], b = above[i], c = above[i - step];
+        const std::uint8_t a = left[i], b = above[i], c = aboveLeft[i];
         const std::uint8_t toA = between(b, c), toB = between(a, c);
         // The sum of both where a and b lie on one side of c, which is never the least, or their
         // difference.
