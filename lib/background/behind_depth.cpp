@@ -106,11 +106,16 @@ void smoothBehind(Layer& layer) {
         }
     }
     membrane.solve(kDepthRounds, kDepthRelaxation);
-    for (std::size_t i = 0; i < number.count(); ++i)
-        if (number.data()[i] >= 0)
-            layer.parallax.data()[i] =
-                std::clamp(membrane.values[static_cast<std::size_t>(number.data()[i])], 0.0f,
-                           layer.front.data()[i]);
+    // Rounds that are not at their end yet may have gone too far: nothing is behind all that the
+    // photograph shows.
+    float farthest = std::numeric_limits<float>::infinity();
+    for (const float parallax : layer.far.pixels())
+        if (parallax >= 0) farthest = std::min(farthest, parallax);
+    for (std::size_t i = 0; i < number.count(); ++i) {
+        if (number.data()[i] < 0) continue;
+        const float value = membrane.values[static_cast<std::size_t>(number.data()[i])];
+        layer.parallax.data()[i] = std::min(std::max(value, farthest), layer.front.data()[i]);
+    }
 }
 
 }  // namespace

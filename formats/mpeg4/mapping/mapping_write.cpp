@@ -377,7 +377,12 @@ class SceneWriter {
 
     void sayWhatIsLost(std::size_t i, const ReferenceView& view, const ViewImages& images) {
         const Padding& p = images.padding;
-        if (p.any() || p.shift > 1e-6)
+        if (!p.any() && p.shift > 1e-6)
+            job_.note(
+                fmt::format("{}: its principal point is {:.3g} pixels off the centre, to "
+                            "which it is moved",
+                            viewName(i), p.shift));
+        if (p.any())
             job_.note(fmt::format(
                 "{}: its principal point is off the centre; padded by {} {} {} {} pixels (left, "
                 "top, right, bottom), the rest of {:.3g} pixels is moved",

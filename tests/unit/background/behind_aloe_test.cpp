@@ -1,5 +1,5 @@
 // What view 1 of a real set hides, beside its views 3 and 5: the background that is invented
-// against what drawing fills without one. Ratios only.
+// against what drawing fills without one. Ratios only. And what a photograph of a phone hides.
 
 #include <algorithm>
 #include <cmath>
@@ -228,6 +228,25 @@ TEST(BehindAloe, WhatIsUncoveredKeepsItsColourWhileTheEyeMoves) {
     std::printf("  colours stray by %.2f levels where they are filled, %.2f invented\n", swamFilled,
                 swamInvented);
     EXPECT_LT(swamInvented, 0.5 * swamFilled);
+}
+
+// Depth of phones, whose hidden places are smoothed over long ways.
+TEST(BehindPhone, NothingIsBehindAllThatThePhotographShows) {
+    REQUIRE_SHARED(photo, "data/phones/apple-jpeg/bikes-rot90.jpg");
+    Job job;
+    ImageSetOptions options;
+    options.refine = *RefineSettings::from("auto,-raise");
+    const auto bundle = readImageSet(photo, options, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    const auto behind = behindPhoto(bundle->views[0], {}, job);
+    ASSERT_TRUE(behind) << behind.error().text();
+    const auto farthest = [](const Image<float>& depth) {
+        float most = 0;
+        for (const float value : depth.pixels())
+            if (hasPoint(value)) most = std::max(most, value);
+        return most;
+    };
+    EXPECT_LE(farthest(behind->view.depth), 1.001f * farthest(bundle->views[0].depth));
 }
 
 }  // namespace stx
