@@ -33,7 +33,7 @@ OTHERS = [["extract", "IN", "-o", "OUT/set"], ["extract", "IN", "-o", "OUT/point
           ["extract", "IN", "-o", "OUT/few.glb", "--triangles", "50"], ["extract", "IN", "-o", "OUT/photo.jpg"],
           ["render", "IN", "-o", "OUT/sway_%02d.png", "--sway", "5", "--frames", "2", "--size", "24x24", "--backend", "cpu"],
           ["extract", "IN", "-o", "OUT/cloud.spz", "--max-splats", "50"],
-          ["select", "IN", "-o", "OUT/a.exr", "--count", "1"],
+          ["select", "IN", "-o", "OUT/a.exr", "--count", "1"], ["background", "IN", "-o", "OUT/behind.exr"],
           ["bake", "IN", "-o", "OUT/a.mp4"], ["pack", "IN", "-o", "OUT/atlas"],
           ["convert", "IN", "-o", "OUT/o.mp4", "--octree-image", "4"],
           ["sheet", "IN", "-o", "OUT/a.png", "--size", "900x700"], ["info", "IN", "--cameras", "OUT/a.svg"]]

@@ -39,6 +39,7 @@ def main():
             args.model = os.path.join(top, "quad.obj")
         must([args.stx, "convert", args.model, "-o", "in.exr", "--views", "sphere:5", "--size", "96x80"], top)
         must([args.stx, "bake", "in.exr", "-o", "baked.mp4"], top)
+        must([args.stx, "select", "in.exr", "-o", "one.exr", "--count", "1"], top)
         must([args.stx, "convert", "quad.obj", "-o", "quad.mp4", "--views", "cube", "--size", "40x40"], top)
         film_set(args.stx, os.path.join(top, "in.exr"), os.path.join(top, "film"))
         must([args.stx, "convert", "film", "-o", "film.mp4"], top)
@@ -88,6 +89,7 @@ def main():
             "sheet": ["sheet", "IN/baked.mp4", "-o", "OUT/a.png"],
             "sheet of two": ["sheet", "IN/in.exr", "IN/baked.mp4", "-o", "OUT/a.png"],
             "sheet of a film": ["sheet", "IN/film.mp4", "-o", "OUT/a.png"],
+            "background of a photograph": ["background", "IN/one.exr", "-o", "OUT/a.exr"],
             "background": ["background", "IN/frames", "-o", "OUT/a.png", "--confidence", "OUT/c.png", "--mask-of", "all",
                            "--mask-output", "OUT/m_%04d.png"],
             "background in bands": ["background", "IN/frames/f_%04d.png", "-o", "OUT/a.png", "--drift", "--max-memory", "1"],
