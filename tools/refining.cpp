@@ -1,5 +1,8 @@
 #include "tools/refining.hpp"
 
+#include <algorithm>
+#include <cstdint>
+
 #include <fmt/format.h>
 
 #include "formats/any/changed_once.hpp"
@@ -20,6 +23,17 @@ Result<void> checkNoImport(const RefineSettings& settings) {
                 "camera); have it done there: stx convert SET --refine {}",
                 info.name, info.name);
     return {};
+}
+
+/// checkPeak() of all views of a table in memory.
+Result<void> checkPeakOfAll(const PeakMemory& step, const ViewTable& views, const Limits& limits) {
+    std::uint64_t pixels = 0, largest = 0, held = 0;
+    for (std::size_t i = 0; i < views.count(); ++i) {
+        pixels += views.pixelsOf(i);
+        largest = std::max(largest, views.pixelsOf(i));
+        held += views.bytesGiven(i);
+    }
+    return checkPeak(step, pixels, largest, held, limits);
 }
 
 }  // namespace
@@ -48,16 +62,20 @@ Result<std::unique_ptr<Sequence>> refined(std::unique_ptr<Sequence> frames, cons
                                           const std::filesystem::path& keepIn) {
     STX_TRY(const auto settings, refineSettings(text));
     if (!settings.any()) return frames;
-    const auto refine = [settings, then](Bundle& bundle, Job& job) -> Result<void> {
+    const bool thenMore = then.perPixel + then.perPixelOfLargest > peak::kRefine.perPixel;
+    const PeakMemory most = thenMore ? then : peak::kRefine;
+    const auto refine = [settings, most](Bundle& bundle, Job& job) -> Result<void> {
         // Before the work, and not after it.
-        const bool thenMore = then.perPixel + then.perPixelOfLargest > peak::kRefine.perPixel;
-        STX_CHECK(checkPeak(thenMore ? then : peak::kRefine, bundle.views, job.limits));
+        STX_CHECK(checkPeak(most, bundle.views, job.limits));
         STX_TRY(const auto report, stx::refine(bundle, settings, job));
         if (report.changed()) job.note(report.note());
         return {};
     };
-    const auto needed = [settings](const ViewTable& views, Job& job) {
-        return mayRefine(views, settings, job);
+    const auto needed = [settings, most](const ViewTable& views, Job& job) -> Result<bool> {
+        auto found = mayRefine(views, settings, job);
+        // Where a view alone is too large, the limit that is named is enough for what follows, too.
+        if (!found) STX_CHECK(checkPeakOfAll(most, views, job.limits));
+        return found;
     };
     return keepIn.empty() ? changed(std::move(frames), refine, needed)
                           : changedOnce(std::move(frames), refine, keepIn);
