@@ -10,6 +10,7 @@
 #include "lib/model/median_distance.hpp"
 #include "lib/model/peak_memory.hpp"
 #include "lib/model/splat_cloud.hpp"
+#include "lib/refine/refine_needed.hpp"
 #include "lib/render/factory.hpp"
 
 namespace stx::tools {
@@ -99,14 +100,6 @@ Result<Bundle> readViews(const RenderOptions& o, const PeakMemory& drawing, cons
     return someViews(table, wanted, spool.get(), job, look);
 }
 
-/// Whether summaries say that refining would find nothing to do, and no step is asked for.
-bool isExact(const RenderSettings& settings, const ViewTable& table) {
-    return !table.summaries().empty() && tellWithoutPixels(table.about().views) &&
-           std::ranges::none_of(refineSteps(), [&](const RefineStepInfo& info) {
-               return settings.refine.of(info.step) == RefineSwitch::on;
-           });
-}
-
 /// Whether the views of a table that is exact may be chosen by the pictures that are wanted:
 /// nothing looks at all of them first.
 bool mayChoose(const RenderOptions& o, const ViewTable& table) {
@@ -124,7 +117,7 @@ Result<void> openStill(const RenderOptions& o, const RenderSettings& settings, D
     }
     STX_TRY(auto opened, openMeshOrViews(o.input, o.open, job));
     auto& table = std::get<std::unique_ptr<ViewTable>>(opened);
-    scene.exact = isExact(settings, *table);
+    scene.exact = tellWithoutPixels(table->about().views) && saidToBeExact(*table, settings.refine);
     if (scene.exact && mayChoose(o, *table)) {
         STX_TRY(scene.model,
                 someViews(*table, std::vector<bool>(table->count(), false), nullptr, job));

@@ -24,7 +24,7 @@ constexpr int kHops[kRounds] = {1, 4, 2};
 
 }  // namespace
 
-Sources findSources(const Layer& layer) {
+Result<Sources> findSources(const Layer& layer, Job& job) {
     std::vector<PatchLevel> levels;
     levels.emplace_back(layer);
     while (std::min(layer.photo.x, layer.photo.y) >> levels.size() >= kSmallestSide)
@@ -39,7 +39,10 @@ Sources findSources(const Layer& layer) {
         levels.erase(levels.begin() + static_cast<std::ptrdiff_t>(i) + 1, levels.end());
         const int votes = i == 0 ? kFineVotes : i == coarsest ? kCoarseVotes : kVotes;
         for (int vote = 0; vote <= votes; ++vote) {
-            for (const int hop : kHops) levels[i].improve(hop);
+            for (const int hop : kHops) {
+                STX_CHECK(job.checkCancelled());
+                levels[i].improve(hop);
+            }
             if (vote < votes) levels[i].vote();
         }
     }

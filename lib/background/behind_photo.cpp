@@ -125,7 +125,7 @@ Result<BehindPhoto> behindPhoto(const ReferenceView& view, const BehindSettings&
     STX_CHECK(job.checkCancelled());
     inventColour(layer);
     STX_CHECK(job.checkCancelled());
-    const Sources sources = findSources(layer);
+    STX_TRY(const Sources sources, findSources(layer, job));
     STX_CHECK(job.checkCancelled());
 
     layer.far = {};

@@ -128,17 +128,20 @@ class PartNeeds {
 
 }  // namespace
 
+bool saidToBeExact(const ViewTable& table, const RefineSettings& settings) {
+    return !table.summaries().empty() &&
+           std::ranges::none_of(table.about().views,
+                                [](const ViewHeader& view) { return view.refined.doubt > 0; }) &&
+           std::ranges::none_of(refineSteps(), [&](const RefineStepInfo& info) {
+               return settings.of(info.step) == RefineSwitch::on;
+           });
+}
+
 Result<bool> mayRefine(const ViewTable& table, const RefineSettings& settings, Job& job) {
     RefineSettings once = settings;
     for (const ViewHeader& view : table.about().views) once = once.after(view.refined);
     if (once.on(poses)) return true;
-    // Files say it of exact views.
-    const bool asks = std::ranges::any_of(refineSteps(), [&](const RefineStepInfo& info) {
-        return settings.of(info.step) == RefineSwitch::on;
-    });
-    const bool doubtful = std::ranges::any_of(
-        table.about().views, [](const ViewHeader& view) { return view.refined.doubt > 0; });
-    if (!asks && !doubtful && !table.summaries().empty()) return false;
+    if (saidToBeExact(table, settings)) return false;
     // Read again by whoever uses the views, who says what is to say.
     Job quiet;
     quiet.workFor(job);

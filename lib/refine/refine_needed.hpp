@@ -5,11 +5,14 @@
 
 namespace stx {
 
+/// Whether the file of the views says that they are exact (ViewTable::summaries()), and no step is
+/// asked for by name: refine() has nothing to do, and no pixel is looked at for that.
+[[nodiscard]] bool saidToBeExact(const ViewTable& table, const RefineSettings& settings);
+
 /// Whether refine() may change something in views that are read one by one. False: it would leave
 /// them as they are, to the bit. True without a look at pixels of what is captured, whose views
-/// only tell side by side. False without a look at pixels of a file that has summaries
-/// (ViewTable::summaries()), where no step is asked for by name. Else views are read three times,
-/// without `exposure` once. Errors: those of the views, cancelled.
+/// only tell side by side. False without a look at pixels where saidToBeExact(). Else views are
+/// read three times, without `exposure` once. Errors: those of the views, cancelled.
 [[nodiscard]] Result<bool> mayRefine(const ViewTable& table, const RefineSettings& settings,
                                      Job& job);
 
