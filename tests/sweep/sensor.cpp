@@ -94,12 +94,16 @@ void loseDepth(ReferenceView& view, Random& random) {
 
 Bundle recorded(const Captured& captured, std::string& what) {
     Random random(captured.from.seed * 131 + std::uint64_t(captured.from.number));
+    // Seen from another eye, the sensor is the same and its errors are others.
+    const auto beside = std::uint64_t(captured.from.beside);
+    Random errors(captured.from.seed * 131 + beside * 7919 + std::uint64_t(captured.from.number));
     Bundle out = captured.bundle;
     const auto add = [&](const std::string& kind) { what += (what.empty() ? "" : ", ") + kind; };
     const double usual = medianDistance(out.views.front());
     if (random.chance(0.6)) {
         const double share = random.logBetween(0.001, 0.005);
-        for (std::size_t i = 0; i < out.views.size(); ++i) addNoise(out.views[i], i, share, usual);
+        for (std::size_t i = 0; i < out.views.size(); ++i)
+            addNoise(out.views[i], i + out.views.size() * beside, share, usual);
         add(fmt::format("noise of {:.2f} %", 100 * share));
     }
     if (random.chance(0.4)) {
@@ -116,7 +120,7 @@ Bundle recorded(const Captured& captured, std::string& what) {
     }
     if (random.chance(0.4)) {
         const double share = random.logBetween(0.001, 0.005);
-        const auto part = [&] { return random.between(-1, 1); };
+        const auto part = [&] { return (beside ? errors : random).between(-1, 1); };
         for (ReferenceView& view : out.views) {
             const double x = part(), y = part(), z = part();
             view.camera.position += share * usual * glm::dvec3(x, y, z);

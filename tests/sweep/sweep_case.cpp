@@ -337,7 +337,13 @@ Result<Captured> capturedOf(const SweepCase& c) {
     STX_TRY(std::vector<Camera> cameras, referenceCameras(c, captured.scene));
     STX_TRY(captured.novel, novelCamera(c, captured.scene, cameras));
     Random random(c.seed * 31337 + static_cast<std::uint64_t>(c.number) + 3);
+    // Where outlines fall between the pixels of the views is luck, and the same in all views of a
+    // rig along a straight edge: other eyes get views whose pixels lie elsewhere.
+    const glm::dvec2 phase =
+        0.5 * glm::dvec2(aside(c.beside * 0.754878), aside(c.beside * 0.569840));
     for (std::size_t i = 0; i < cameras.size(); ++i) {
+        cameras[i].cx += phase.x;
+        cameras[i].cy += phase.y;
         const double dx = random.between(-0.15, 0.15), dy = random.between(-0.15, 0.15);
         if (c.offCentre) {
             cameras[i].cx += dx * cameras[i].width;

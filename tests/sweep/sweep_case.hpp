@@ -57,7 +57,8 @@ struct SweepCase {
     [[nodiscard]] std::string changes() const;
     /// For people: "torus, ring:5 of 48x48, orthographic, drawn at 96x80, 2.0 times magnified".
     [[nodiscard]] std::string describe() const;
-    /// The same case seen from `kBesides` other places within 15 degrees.
+    /// The same case seen from `kBesides` other places within 15 degrees, captured with pixels that
+    /// lie up to half a pixel elsewhere, by a sensor that errs otherwise.
     static constexpr int kBesides = 32;
     [[nodiscard]] std::vector<SweepCase> besides() const;
     /// Simpler cases of the same kind, the simplest first.
