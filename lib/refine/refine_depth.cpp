@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "lib/base/cpu_clock.hpp"
+#include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
 #include "lib/geometry/pixel_space.hpp"
@@ -37,7 +38,8 @@ constexpr SilhouetteAlpha kLevels{0.4625f, 0.99f};
 /// pixels happens to have. One of 14 exact views of a torus, of 153 points, was taken for noisy.
 constexpr std::int64_t kFewestNoisy = 500;
 /// Where views with less than half of the points are noisy, only those are that have so many times
-/// what isNoisy() asks for. Two of nine views of a torus with noise of a tenth of a pixel were
+/// what isNoisy() asks for; where those with half of the points are, the others are that have so
+/// large a part of it. Two of nine views of a torus with noise of a tenth of a pixel were
 /// smoothed: 32.4 dB instead of 41.5 (tests/sweep, 77001:259).
 constexpr float kClearlyNoisy = 2.0f;
 
@@ -98,15 +100,29 @@ std::int64_t pointsOfNoisy(std::span<const Work> works, std::span<const float> n
     return points;
 }
 
-/// Views of one camera have one noise, which each tells with some error: takes what few say away.
+/// Views of one camera have one noise, which each tells with some error, and small ones not at all
+/// (0): what few say is taken away, and what most say given to those that hardly say otherwise.
 void settleNoise(std::span<const Work> works, std::span<float> noise) {
     const std::int64_t noisy = pointsOfNoisy(works, noise);
-    if (noisy < kFewestNoisy) std::ranges::fill(noise, 0.0f);
+    if (noisy < kFewestNoisy) {
+        std::ranges::fill(noise, 0.0f);
+        return;
+    }
     std::int64_t points = 0;
-    for (const Work& w : works) points += pointsIn(w);
-    if (2 * noisy >= points) return;
-    for (std::size_t k = 0; k < works.size(); ++k)
-        if (!isNoisy(noise[k] / kClearlyNoisy, works[k].space.axis)) noise[k] = 0.0f;
+    std::vector<float> ofNoisy;
+    for (std::size_t k = 0; k < works.size(); ++k) {
+        points += pointsIn(works[k]);
+        if (isNoisy(noise[k], works[k].space.axis)) ofNoisy.push_back(noise[k]);
+    }
+    const bool most = 2 * noisy >= points;
+    const float usual = medianOf(std::move(ofNoisy));
+    for (std::size_t k = 0; k < works.size(); ++k) {
+        const DepthAxis& axis = works[k].space.axis;
+        const bool is = isNoisy(noise[k], axis);
+        if (!most && is && !isNoisy(noise[k] / kClearlyNoisy, axis)) noise[k] = 0.0f;
+        if (most && !is && (noise[k] == 0.0f || isNoisy(noise[k] * kClearlyNoisy, axis)))
+            noise[k] = usual;
+    }
 }
 
 /// Scene units between depth codes; 0 of floats.

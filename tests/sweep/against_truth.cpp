@@ -94,12 +94,18 @@ Outcome surfaceBelowSplats(Pictures& pictures) {
     return Measure{worseBy(a, b), fmt::format("surface {:.2f} dB, splat {:.2f} dB", a, b)};
 }
 
-Outcome noisySurfaceBelowSplats(Pictures& pictures) {
-    if (pictures.seenCount(1) < kFewest) return std::nullopt;
+Bundle noisyViews(const Pictures& pictures, double& share) {
     constexpr std::array kShares{0.002, 0.005, 0.01};
-    const double share = kShares[std::size_t(pick(pictures, 311, int(kShares.size())))];
+    share = kShares[std::size_t(pick(pictures, 311, int(kShares.size())))];
     Bundle noisy = pictures.captured().bundle;
     noisy::addNoise(noisy, share);
+    return noisy;
+}
+
+Outcome noisySurfaceBelowSplats(Pictures& pictures) {
+    if (pictures.seenCount(1) < kFewest) return std::nullopt;
+    double share = 0;
+    const Bundle noisy = noisyViews(pictures, share);
     STX_TRY(const Frame surface, drawBundle(noisy, pictures.captured().novel, kNormal));
     STX_TRY(const Frame splats, drawBundle(noisy, pictures.captured().novel, kSplat));
     const double a = pictures.psnr(surface), b = pictures.psnr(splats);

@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "formats/stx/stx.hpp"
+#include "tests/sweep/measures.hpp"
 #include "tests/sweep/random.hpp"
 #include "tests/sweep/rules.hpp"
 #include "tests/sweep/sensor.hpp"
@@ -117,6 +118,8 @@ stx::Result<void> keep(const Captured& captured, const std::filesystem::path& fo
     STX_CHECK(save(captured.bundle, folder / "case.exr", {}, job));
     std::string what;
     STX_CHECK(save(sensor::recorded(captured, what), folder / "recorded.exr", {}, job));
+    double share = 0;
+    STX_CHECK(save(measures::noisyViews(Pictures(captured), share), folder / "noisy.exr", {}, job));
     Bundle truth;
     truth.views = {captured.truth};
     truth.views[0].name = "truth";

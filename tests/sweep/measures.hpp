@@ -13,6 +13,8 @@ Outcome drawnWhereEmpty(Pictures& pictures);
 Outcome betterQualityCoversLess(Pictures& pictures);
 Outcome betterQualityIsWorse(Pictures& pictures);
 Outcome surfaceBelowSplats(Pictures& pictures);
+/// The views of a case with noise, of a `share` of the distance that follows from the case.
+[[nodiscard]] stx::Bundle noisyViews(const Pictures& pictures, double& share);
 Outcome noisySurfaceBelowSplats(Pictures& pictures);
 Outcome exactDepthIsRepaired(Pictures& pictures);
 Outcome exactViewsDisagree(Pictures& pictures);
