@@ -55,7 +55,7 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
     SplatFrame frame;
     frame.uniforms = uniformsOf(scene, settings, novel, margin);
     std::vector<TaskEntry> small, large;
-    double crowd = 0;  // points that may meet in one pixel, all views together
+    double crowd = 0;  // weights of the points that may meet in one pixel, all views together
     struct Planned {
         splat::BlockTask task;
         double density = 0;
@@ -86,12 +86,13 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
                                       p.density = density(info, info.blocks[i], p.task, novel);
                               }
                           });
-        double densest = 0;
+        double densest = 0, heaviest = 0;
         const glm::ivec3 place = scene.places[k];
         for (const Planned& p : planned) {
             if (!p.seen) continue;
             const splat::BlockTask& t = p.task;
             densest = std::max(densest, p.density);
+            heaviest = std::max(heaviest, double(t.quality));
             const auto add = [&](int u0, int v0, int u1, int v1) {
                 const TaskEntry entry{
                     static_cast<std::uint32_t>(u0) | static_cast<std::uint32_t>(v0) << 16,
@@ -116,7 +117,7 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
             };
             splat::forNeeded(t, add);
         }
-        crowd += std::max(1.0, densest);
+        crowd += std::max(1.0, densest) * heaviest;
     }
     frame.uniformTasks = static_cast<int>(frame.tasks.size());
     frame.smallTasks = static_cast<int>(small.size());
