@@ -207,7 +207,7 @@ std::optional<double> Pictures::openShare(const Frame& frame, int least) const {
 std::optional<double> Pictures::drawnShare(const Frame& frame) const {
     std::int64_t drawn = 0, empty = 0;
     for (std::size_t i = 0; i < empty_.count(); ++i) {
-        if (empty_.data()[i] == 0) continue;
+        if (empty_.data()[i] == 0 || guessed_.data()[i]) continue;
         ++empty;
         drawn += frame.colour.data()[i].a >= kCovered;
     }

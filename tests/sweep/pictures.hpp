@@ -47,7 +47,8 @@ class Pictures {
     /// Pixels of seenBy() that count at least `least`.
     [[nodiscard]] std::int64_t seenCount(int least) const;
     /// Percent of the pixels that at least `least` views show for sure which a frame leaves open,
-    /// or of those of empty() which it covers. Nothing where they are fewer than a hundred.
+    /// or of those of empty() which it covers, without guesses as in psnr(). Nothing where they are
+    /// fewer than a hundred.
     [[nodiscard]] std::optional<double> openShare(const stx::Frame& frame, int least) const;
     [[nodiscard]] std::optional<double> drawnShare(const stx::Frame& frame) const;
     /// PSNR of a frame against the truth, before black, without the pixels where the truth shows
