@@ -391,9 +391,7 @@ Result<void> repair(const SetView& set, const ImageSetOptions& options, StoredVi
     const Texture& picture = stored.texture;
     if (stored.depth.width() != picture.width()) {
         StepOfView step(report, RefineStep::raise);
-        stored.depth =
-            raiseDepth(stored.depth, picture,
-                       resizeTexture(picture, stored.depth.width(), stored.depth.height()));
+        stored.depth = raiseDepth(stored.depth, picture);
         step.changed(static_cast<std::int64_t>(stored.depth.count()));
     }
     if (does(RefineStep::gaps, set.measured)) {
