@@ -183,8 +183,9 @@ class RaisedStrip {
 
 }  // namespace
 
-Image<float> raiseDepth(const Image<float>& depth, const Texture& picture) {
-    const CoarseDepth coarse(depth, picture);
+Image<float> raiseDepth(const Image<float>& depth, const Texture& picture,
+                        const Image<std::uint8_t>* matte) {
+    const CoarseDepth coarse(depth, picture, matte);
     const int width = picture.width(), height = picture.height();
     Image<float> out(width, height, kNoDepth);
     // Strips are always the same ones, so that bytes do not depend on the number of threads.

@@ -10,6 +10,7 @@ namespace stx {
 /// samples are near and have its colour, together with the neighbours that look like it, so that
 /// the edge lies where the picture has it and no point appears between two surfaces. kNoDepth is
 /// one of the surfaces. The same on any number of threads.
-[[nodiscard]] Image<float> raiseDepth(const Image<float>& depth, const Texture& picture);
+[[nodiscard]] Image<float> raiseDepth(const Image<float>& depth, const Texture& picture,
+                                      const Image<std::uint8_t>* matte = nullptr);
 
 }  // namespace stx

@@ -26,6 +26,8 @@ constexpr float kAnyColour = 0.1f;
 /// Worth of the interpolated depth beside that of colours: depth that is reduced is between two
 /// surfaces by as much as an edge crosses a sample.
 constexpr float kBetweenWorth = 2.0f;
+/// Worth of a matte that says the opposite: more than all else together.
+constexpr float kMatteWorth = 8.0f;
 
 /// A plane through samples of one surface, weighted by how near they are to the middle one.
 struct PlaneSum {
@@ -54,8 +56,10 @@ double nearness(double x, double y) {
 
 }  // namespace
 
-CoarseDepth::CoarseDepth(const Image<float>& depth, const Texture& picture)
-    : inverse_(depth.width(), depth.height()) {
+CoarseDepth::CoarseDepth(const Image<float>& depth, const Texture& picture,
+                         const Image<std::uint8_t>* matte)
+    : inverse_(depth.width(), depth.height()),
+      matte_(matte && matte->count() > 0 ? matte : nullptr) {
     for (std::size_t i = 0; i < depth.count(); ++i)
         inverse_.data()[i] = hasPoint(depth.data()[i]) ? 1 / depth.data()[i] : 0.0f;
     findMixed();
@@ -112,6 +116,7 @@ void CoarseDepth::gatherColours(const Texture& picture) {
             }
             const auto count = static_cast<float>((bottom - top) * (right - left));
             Colours& out = colours_.at(cx, cy);
+            out.matte = matteAt({cx, cy});
             out.mean = sum / count;
             const glm::vec3 variance = glm::max(squares / count - out.mean * out.mean, 0.0f) +
                                        kLeastDeviation * kLeastDeviation;
@@ -120,6 +125,24 @@ void CoarseDepth::gatherColours(const Texture& picture) {
                        std::sqrt(variance.x * variance.y * variance.z);
         }
     });
+}
+
+/// Between the matte's pixels, 0..1; 0 without one.
+float CoarseDepth::matteAt(glm::dvec2 at) const {
+    if (!matte_) return 0;
+    const glm::dvec2 size(matte_->width(), matte_->height());
+    const glm::dvec2 pixel = glm::clamp((at + 0.5) * size / glm::dvec2(width(), height()) - 0.5,
+                                        glm::dvec2(0), size - 1.0);
+    const glm::ivec2 first(pixel);
+    const glm::dvec2 part = pixel - glm::dvec2(first);
+    double sum = 0;
+    for (int k = 0; k < 4; ++k) {
+        const int u = std::min(first.x + k % 2, matte_->width() - 1),
+                  v = std::min(first.y + k / 2, matte_->height() - 1);
+        sum += (k % 2 == 1 ? part.x : 1 - part.x) * (k / 2 == 1 ? part.y : 1 - part.y) *
+               matte_->at(u, v);
+    }
+    return static_cast<float>(sum / 255);
 }
 
 bool CoarseDepth::isOneSurface(glm::dvec2 at, float& inverse) const {
@@ -208,7 +231,7 @@ std::array<float, kRaisedSurfaces> CoarseDepth::costs(const SurfacesAround& arou
         nearX[k] = static_cast<float>(nearness(middle.x + i - kRaiseReach - at.x, 0));
         nearY[k] = static_cast<float>(nearness(middle.y + i - kRaiseReach - at.y, 0));
     }
-    std::array<float, kRaisedSurfaces> alike{}, cost{};
+    std::array<float, kRaisedSurfaces> alike{}, near{}, mattes{}, cost{};
     float total = 0;
     for (std::size_t i = 0; i < kRaiseSamples; ++i) {
         const std::uint8_t k = around.of[i];
@@ -217,22 +240,26 @@ std::array<float, kRaisedSurfaces> CoarseDepth::costs(const SurfacesAround& arou
         const Colours& own = colours_.at(middle.x + x - kRaiseReach, middle.y + y - kRaiseReach);
         const glm::vec3 off = colour - own.mean;
         const float like = own.norm * std::exp(-0.5f * glm::dot(off * off, own.sharpness));
-        const float value = nearX[static_cast<std::size_t>(x)] *
-                            nearY[static_cast<std::size_t>(y)] * (like + kAnyColour);
-        alike[k] += value;
-        total += value;
+        const float weight =
+            nearX[static_cast<std::size_t>(x)] * nearY[static_cast<std::size_t>(y)];
+        alike[k] += weight * (like + kAnyColour);
+        total += weight * (like + kAnyColour);
+        near[k] += weight;
+        mattes[k] += weight * own.matte;
     }
     const float span =
         around.surfaces[0].high - around.surfaces[static_cast<std::size_t>(around.count - 1)].low;
     float between = 0;
     (void)isOneSurface(at, between);
+    const float matte = matteAt(at);
     for (int k = 0; k < around.count; ++k) {
         const auto n = static_cast<std::size_t>(k);
         const glm::vec2 off(at - glm::dvec2(middle));
         cost[n] =
             -std::log(alike[n] / total + 1e-9f) +
             kBetweenWorth * std::min(1.0f, std::abs(between - around.surfaces[n].at(off.x, off.y)) /
-                                               std::max(span, 1e-30f));
+                                               std::max(span, 1e-30f)) +
+            kMatteWorth * std::abs(matte - mattes[n] / near[n]);
     }
     return cost;
 }

@@ -42,7 +42,10 @@ struct SurfacesAround {
 /// in samples, (0, 0) in the middle of the first one.
 class CoarseDepth {
   public:
-    CoarseDepth(const Image<float>& depth, const Texture& picture);
+    /// `matte`: what of the picture belongs to a person, 0..255, of any size of the same shape,
+    /// which has to stay there; null: nobody tells.
+    CoarseDepth(const Image<float>& depth, const Texture& picture,
+                const Image<std::uint8_t>* matte);
 
     [[nodiscard]] int width() const { return inverse_.width(); }
     [[nodiscard]] int height() const { return inverse_.height(); }
@@ -51,7 +54,8 @@ class CoarseDepth {
     [[nodiscard]] bool isOneSurface(glm::dvec2 at, float& inverse) const;
     [[nodiscard]] SurfacesAround surfacesAround(int x, int y) const;
     /// What it costs a pixel with that colour to go to each of the surfaces around sample `middle`:
-    /// minus the logarithm of how well the colours and places of its samples explain it.
+    /// minus the logarithm of how well the colours and places of its samples explain it, and how
+    /// far their matte is from the pixel's.
     [[nodiscard]] std::array<float, kRaisedSurfaces> costs(const SurfacesAround& around,
                                                            glm::ivec2 middle, glm::dvec2 at,
                                                            glm::vec3 colour) const;
@@ -61,15 +65,18 @@ class CoarseDepth {
         glm::vec3 mean{0};
         glm::vec3 sharpness{0};  ///< 1 / variance
         float norm = 0;          ///< the share of the density of the narrowest colours
+        float matte = 0;         ///< 0..1
     };
 
     void findMixed();
     void gatherColours(const Texture& picture);
     [[nodiscard]] float clampedAt(int x, int y) const;
+    [[nodiscard]] float matteAt(glm::dvec2 at) const;
 
     Image<float> inverse_;  ///< 1/z; 0: no depth
     Image<std::uint8_t> mixed_;
     Image<Colours> colours_;
+    const Image<std::uint8_t>* matte_;
 };
 
 }  // namespace stx
