@@ -391,9 +391,7 @@ Result<void> repair(const SetView& set, const ImageSetOptions& options, StoredVi
     const Texture& picture = stored.texture;
     if (stored.depth.width() != picture.width()) {
         StepOfView step(report, RefineStep::raise);
-        stored.depth =
-            raiseDepth(stored.depth, picture,
-                       resizeTexture(picture, stored.depth.width(), stored.depth.height()));
+        stored.depth = raiseDepth(stored.depth, picture, &stored.matte);
         step.changed(static_cast<std::int64_t>(stored.depth.count()));
     }
     if (does(RefineStep::gaps, set.measured)) {
@@ -478,8 +476,8 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
         if (raise) {
             job.note(fmt::format(
                 "depth of {}x{} is raised to the size of its picture, {}x{}, along the picture's "
-                "edges",
-                dw, dh, tw, th));
+                "edges{}",
+                dw, dh, tw, th, stored.matte.count() > 0 ? " and its portrait matte" : ""));
         } else {
             job.note(fmt::format("images of {}x{} are resampled to the size of their depth, {}x{}",
                                  tw, th, dw, dh));

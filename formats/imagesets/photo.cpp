@@ -206,7 +206,7 @@ void noteDepth(const Photo& photo, const PhotoDepth& depth, const ImageSetOption
         notes.emplace_back("the picture with the blurred background is used, as --colour-of says");
 }
 
-Result<StoredView> loadPhoto(const Photo& photo, const PhotoDepth& depth,
+Result<StoredView> loadPhoto(const Photo& photo, const PhotoDepth& depth, bool wantsMatte,
                              const std::vector<std::string>& notes, Job& job) {
     for (const std::string& note : notes) job.note(note);
     StoredView stored;
@@ -217,6 +217,12 @@ Result<StoredView> loadPhoto(const Photo& photo, const PhotoDepth& depth,
     STX_TRY(auto picture, photos::decodeColour(photo, profile, job));
     if (!profile.empty()) job.note(profile);
     stored.texture = std::move(picture);
+    if (wantsMatte && photo.matte.coding != PhotoImage::Coding::none) {
+        if (auto matte = photos::decodeMatte(photo, job))
+            stored.matte = std::move(*matte);
+        else
+            job.note("its portrait matte is not used: " + matte.error().text());
+    }
     return stored;
 }
 
@@ -276,8 +282,9 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
     view.camera = cameraOfPhoto(*photo, size, options, set.cameraFrom, notes);
     noteDepth(*photo, depth, options, notes);
     view.stretched = beside.empty();
-    view.load = [photo, depth, notes](const SetView&, Job& own) {
-        return loadPhoto(*photo, depth, notes, own);
+    const bool raises = options.refine.atImport(RefineStep::raise, true);
+    view.load = [photo, depth, raises, notes](const SetView&, Job& own) {
+        return loadPhoto(*photo, depth, raises, notes, own);
     };
     view.distances = [code = depth.code, unit = depth.unit](Image<float>& values,
                                                             const Camera& camera, int bits,

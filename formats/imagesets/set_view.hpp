@@ -43,6 +43,9 @@ struct StoredView {
     bool alpha = false;  ///< the texture's alpha is the set's own coverage
     Image<float> depth;  ///< as stored; see SetView::distances
     int depthBits = 32;  ///< of the stored values: 8, 16, or 32 for floats
+    /// What of the picture belongs to a person (255: all of a pixel), of the picture's shape;
+    /// empty: nobody tells.
+    Image<std::uint8_t> matte;
 };
 
 /// Turns stored values into planar distances (panoramas: ray lengths) in scene units, 0 where not

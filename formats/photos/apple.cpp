@@ -60,6 +60,10 @@ Result<bool> readMpf(const JpegPhoto& jpeg, Photo& photo) {
             STX_TRY(photo.depth, embeddedPicture(picture, jpeg.file, "its depth"));
         } else if (!subtype.empty()) {
             photo.mattes.push_back(subtype);
+            // Damaged, it is as if it were not there: depth is what matters.
+            if (auto matte = embeddedPicture(picture, jpeg.file, "its matte");
+                matte && subtype == kPortraitMatte)
+                photo.matte = std::move(*matte);
         } else if (xmp.text("http://ns.apple.com/HDRGainMap/1.0/", "HDRGainMapVersion")) {
             photo.others.emplace_back("a gain map");
         }

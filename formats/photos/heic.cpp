@@ -208,6 +208,11 @@ Result<void> readHeic(Photo& photo, const Limits& limits) {
         const std::string kind = auxiliaryKind(boxes, item->second);
         if (!isDepthKind(kind)) {
             noteAuxiliary(kind, photo);
+            // Damaged or cut in another way, it is as if it were not there: depth is what matters.
+            if (const auto matte = turnOf(boxes, item->second, "its matte");
+                matte && kind.ends_with(kPortraitMatte) && cutAlike(turn, *matte))
+                photo.matte = {PhotoImage::Coding::heif, *copy,           copy, reference.from,
+                               matte->upright.x,         matte->upright.y};
             continue;
         }
         if (photo.depth.coding != PhotoImage::Coding::none) continue;

@@ -95,32 +95,42 @@ tl::unexpected<Error> noDepth(const Photo& photo) {
                                    photo.others.size() + photo.mattes.size() > 1 ? "are" : "is"));
 }
 
-Result<void> checkPictures(const Photo& photo, const Limits& limits) {
-    for (const PhotoImage* image : {&photo.colour, &photo.depth}) {
-        if (image->coding == PhotoImage::Coding::none || image->width == 0) continue;
-        // A HEIF item's own bytes may be few: HEVC codes flat areas with next to nothing.
-        const std::size_t bytes =
-            image->coding == PhotoImage::Coding::heif ? std::size_t{1} << 40 : image->bytes.size();
-        STX_CHECK(checkImageHeader({"other", image->width, image->height, 4, 8}, bytes, limits));
-    }
-    const glm::ivec2 c = photo.uprightSize(photo.colour), d = photo.uprightSize(photo.depth);
-    if (c.x == 0 || d.x == 0) return {};
-    const double ratio = static_cast<double>(c.x) * d.y / (static_cast<double>(c.y) * d.x);
-    // A pixel more or less is no other shape.
-    const double rounding = 1.0 / std::min(d.x, d.y);
-    if (std::abs(ratio - 1) > kMostOtherShape + rounding)
-        return fail(ErrorCode::invalidInput,
-                    "its picture is {}x{}, but its depth {}x{}, which is another shape", c.x, c.y,
-                    d.x, d.y);
-    return {};
+/// What a picture claims to be, against the limits.
+Result<void> checkPicture(const PhotoImage& image, const Limits& limits) {
+    if (image.coding == PhotoImage::Coding::none || image.width == 0) return {};
+    // A HEIF item's own bytes may be few: HEVC codes flat areas with next to nothing.
+    const std::size_t bytes =
+        image.coding == PhotoImage::Coding::heif ? std::size_t{1} << 40 : image.bytes.size();
+    return checkImageHeader({"other", image.width, image.height, 4, 8}, bytes, limits);
 }
 
-/// The values of a picture that is grey, whatever it is coded as.
-Result<PhotoDepthValues> greyOf(const DecodedImage& image) {
+bool sameShape(glm::ivec2 a, glm::ivec2 b) {
+    const double ratio = static_cast<double>(a.x) * b.y / (static_cast<double>(a.y) * b.x);
+    // A pixel more or less is no other shape.
+    const double rounding = 1.0 / std::min(b.x, b.y);
+    return std::abs(ratio - 1) <= kMostOtherShape + rounding;
+}
+
+Result<void> checkPictures(Photo& photo, const Limits& limits) {
+    STX_CHECK(checkPicture(photo.colour, limits));
+    STX_CHECK(checkPicture(photo.depth, limits));
+    const glm::ivec2 c = photo.uprightSize(photo.colour), d = photo.uprightSize(photo.depth),
+                     m = photo.uprightSize(photo.matte);
+    if (m.x > 0 &&
+        (c.x == 0 || m.x > c.x || !sameShape(c, m) || !checkPicture(photo.matte, limits)))
+        photo.matte = {};
+    if (c.x == 0 || d.x == 0 || sameShape(c, d)) return {};
+    return fail(ErrorCode::invalidInput,
+                "its picture is {}x{}, but its depth {}x{}, which is another shape", c.x, c.y, d.x,
+                d.y);
+}
+
+/// The values of a picture that is grey, whatever it is coded as. `what`: "its depth".
+Result<PhotoDepthValues> greyOf(const DecodedImage& image, std::string_view what) {
     PhotoDepthValues out;
     out.bits = image.bits();
     if (out.bits > 16)
-        return fail(ErrorCode::unsupported, "its depth is coded as floats, which is not known");
+        return fail(ErrorCode::unsupported, "{} is coded as floats, which is not known", what);
     out.values = Image<float>(image.width, image.height);
     const auto step = static_cast<std::size_t>(image.channels);
     bool grey = true;
@@ -134,8 +144,17 @@ Result<PhotoDepthValues> greyOf(const DecodedImage& image) {
         },
         image.values);
     if (!grey)
-        return fail(ErrorCode::invalidInput, "its depth is a picture in colours; grey is expected");
+        return fail(ErrorCode::invalidInput, "{} is a picture in colours; grey is expected", what);
     return out;
+}
+
+/// A grey picture of a photo, as it is stored.
+Result<PhotoDepthValues> decodeGrey(const PhotoImage& from, std::string_view what,
+                                    const Limits& limits) {
+    auto decoded = from.coding == PhotoImage::Coding::heif ? decodeHeifItem(from, true, limits)
+                                                           : decodeImage(from.bytes, what, limits);
+    if (!decoded) return tl::unexpected(decoded.error().at(std::string(what)));
+    return greyOf(*decoded, what);
 }
 
 }  // namespace
@@ -268,14 +287,20 @@ Result<PhotoDepthValues> decodeDepth(const Photo& photo, Job& job) {
             return static_cast<float>(std::to_integer<unsigned>(b));
         });
     } else {
-        auto decoded = from.coding == PhotoImage::Coding::heif
-                           ? decodeHeifItem(from, true, job.limits)
-                           : decodeImage(from.bytes, "depth", job.limits);
-        if (!decoded) return tl::unexpected(decoded.error().at("its depth"));
-        STX_TRY(out, greyOf(*decoded));
+        STX_TRY(out, decodeGrey(from, "its depth", job.limits));
     }
     out.values = turnedUpright(std::move(out.values), photo.orientation);
     return out;
+}
+
+Result<Image<std::uint8_t>> decodeMatte(const Photo& photo, Job& job) {
+    STX_TRY(const PhotoDepthValues grey, decodeGrey(photo.matte, "its matte", job.limits));
+    Image<std::uint8_t> out(grey.values.width(), grey.values.height());
+    const float scale = 255.0f / static_cast<float>((1 << grey.bits) - 1);
+    std::ranges::transform(grey.values.pixels(), out.data(), [scale](float v) {
+        return static_cast<std::uint8_t>(std::lround(v * scale));
+    });
+    return turnedUpright(std::move(out), photo.orientation);
 }
 
 }  // namespace stx::photos

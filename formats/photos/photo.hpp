@@ -61,6 +61,8 @@ struct Photo {
     std::string format;  ///< "Apple HEIC", "Apple JPEG", "GDepth", "Dynamic Depth", "Samsung" …
     std::shared_ptr<const Bytes> file;
     PhotoImage colour, depth;
+    /// What of the picture belongs to a person, of the same shape; none in most photos.
+    PhotoImage matte;
     /// "original" and "portrait" where the file has both pictures, the sharp one and the blurred
     /// one; else "only".
     std::string colourIs = "only";
@@ -107,5 +109,9 @@ struct PhotoDepthValues {
     int bits = 8;  ///< 8 or 16
 };
 [[nodiscard]] Result<PhotoDepthValues> decodeDepth(const Photo& photo, Job& job);
+
+/// The matte of a portrait, upright, 0..255 (all of a pixel belongs to the person). Errors as
+/// decodeImage(); of a photo that has one.
+[[nodiscard]] Result<Image<std::uint8_t>> decodeMatte(const Photo& photo, Job& job);
 
 }  // namespace stx::photos

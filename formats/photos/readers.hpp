@@ -38,6 +38,9 @@ struct JpegPhoto {
 [[nodiscard]] Result<PhotoImage> embeddedPicture(ByteSpan bytes, std::shared_ptr<const Bytes> owner,
                                                  std::string_view what);
 
+/// The matte that tells what of a portrait belongs to a person; others are of hair, skin, teeth.
+inline constexpr std::string_view kPortraitMatte = "portraiteffectsmatte";
+
 /// The intrinsics of a picture of so many pixels after quarter turns clockwise, or mirrored.
 [[nodiscard]] PhotoIntrinsics turned(PhotoIntrinsics k, glm::ivec2 size, int quarters);
 [[nodiscard]] PhotoIntrinsics mirrored(PhotoIntrinsics k, glm::ivec2 size, bool leftAndRight);

@@ -142,11 +142,6 @@ Result<BehindPhoto> behindPhoto(const ReferenceView& view, const BehindSettings&
     camera.height = frame.size.y;
     camera.cx += out.border.x;
     camera.cy += out.border.y;
-    out.view.depth = Image<float>(camera.width, camera.height, kNoDepth);
-    if (view.texture.isLinear())
-        out.view.texture = RgbaFloatImage(camera.width, camera.height, glm::vec4(0));
-    else
-        out.view.texture = Rgba8Image(camera.width, camera.height, glm::u8vec4(0));
     out.hidden = drawBehind(layer, sources, view, scale, out.view);
     fitDepthRange(out.view);
     return out;

@@ -3,118 +3,199 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include <glm/glm.hpp>
 
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
+#include "lib/refine/raise_surfaces.hpp"
 
 namespace stx {
 namespace {
 
-/// Samples whose distances differ by less belong to one surface.
-constexpr float kAlikeDepth = 0.02f;
-/// Of the weights of samples: coarse pixels, and sRGB values of 0..1. Tried on four sets whose
-/// depth was taken at every sixth pixel (spheres-miv, icl-nuim, statue, oaktree): 0.34 to 0.85
-/// times as many pixels are off by more than 2 % as with the nearest sample. At 0.08, kAlike takes
-/// textures for edges, which is worse than the nearest sample on spheres-miv.
-constexpr double kNear = 0.7, kAlike = 0.2;
+/// Neighbours on different surfaces: what it costs, and how little of that where their colours
+/// differ by more than kEdgeColour (of 0..1), so that edges lie where the picture has some.
+constexpr float kApart = 2.0f, kApartAnyway = 0.02f, kEdgeColour = 0.06f;
+/// Shares of 1/z by which neighbours may differ for nothing, and from which on all is to be paid.
+constexpr float kFreeStep = 0.005f, kFullStep = 0.035f;
+/// Rounds of messages. Each goes two pixels far.
+constexpr int kMessageRounds = 10;
+/// Rows that are done at a time, and rows around them that are looked at.
+constexpr int kStripRows = 128, kMarginRows = 16;
 
-struct DepthSample {
-    double x = 0, y = 0;  ///< from the pixel, in coarse pixels
-    float depth = kNoDepth;
-    double weight = 0;
+using PerSurface = std::array<float, kRaisedSurfaces>;
+
+/// A pixel at an edge.
+struct RaisedPixel {
+    int x = 0, y = 0, count = 0;
+    PerSurface inverse{}, cost{};
+    /// Pixels to the right, left, below and above that are at an edge, too, or -1; what it costs to
+    /// be on another surface than they, and what they say of each of this pixel's surfaces.
+    std::array<int, 4> beside{-1, -1, -1, -1};
+    std::array<float, 4> apart{};
+    std::array<PerSurface, 4> heard{};
 };
 
-/// 1/z of samples of one surface at the pixel: the plane through them, not beyond their range.
-double inverseAt(const DepthSample* first, const DepthSample* last) {
-    double low = 1e30, high = 0, sum = 0, mean = 0;
-    glm::dmat3 a(0.0);
-    glm::dvec3 b(0.0);
-    for (const DepthSample* s = first; s != last; ++s) {
-        const double v = 1.0 / s->depth;
-        const glm::dvec3 row(1, s->x, s->y);
-        a += glm::outerProduct(row, row) * s->weight;
-        b += row * (v * s->weight);
-        sum += s->weight;
-        mean += v * s->weight;
-        low = std::min(low, v);
-        high = std::max(high, v);
-    }
-    mean /= sum;
-    // Few samples, or all on a line, do not tell a slope.
-    if (!(glm::determinant(a) > 1e-3 * sum * sum * sum)) return mean;
-    return std::clamp((glm::inverse(a) * b).x, low, high);
+float costOfStep(float a, float b) {
+    const float most = std::max(a, b);
+    if (most <= 0) return 0;
+    return std::clamp((std::abs(a - b) / most - kFreeStep) / (kFullStep - kFreeStep), 0.0f, 1.0f);
 }
 
-/// The depth of a pixel at an edge.
-float atEdge(std::array<DepthSample, 16>& samples) {
-    std::sort(samples.begin(), samples.end(),
-              [](const DepthSample& a, const DepthSample& b) { return a.depth < b.depth; });
-    const DepthSample *best = nullptr, *bestEnd = nullptr;
-    double most = -1;
-    for (const DepthSample* from = samples.data(); from != samples.data() + samples.size();) {
-        const DepthSample* to = from + 1;
-        double weight = from->weight;
-        while (to != samples.data() + samples.size() &&
-               (hasPoint(to->depth) ? to->depth - to[-1].depth <= kAlikeDepth * to[-1].depth
-                                    : !hasPoint(to[-1].depth)))
-            weight += (to++)->weight;
-        if (weight > most) {
-            most = weight;
-            best = from;
-            bestEnd = to;
-        }
-        from = to;
+/// Some rows of the picture.
+class RaisedStrip {
+  public:
+    RaisedStrip(const CoarseDepth& coarse, const Texture& picture, int top, int bottom)
+        : coarse_(coarse),
+          picture_(picture),
+          top_(top),
+          index_(picture.width(), bottom - top, -1),
+          inverse_(picture.width(), bottom - top) {}
+
+    void run() {
+        findPixelsAtEdges();
+        for (RaisedPixel& pixel : pixels_) link(pixel);
+        for (int half = 0; half < 2 * kMessageRounds; ++half)
+            for (RaisedPixel& pixel : pixels_)
+                if (((pixel.x + pixel.y + half) & 1) == 0) tell(pixel);
+        for (const RaisedPixel& pixel : pixels_)
+            inverse_.at(pixel.x, pixel.y - top_) = pixel.inverse[bestOf(pixel)];
     }
-    if (!hasPoint(best->depth)) return kNoDepth;
-    return static_cast<float>(1.0 / inverseAt(best, bestEnd));
-}
+
+    [[nodiscard]] float depthAt(int x, int y) const {
+        const float inverse = inverse_.at(x, y - top_);
+        return inverse > 0 ? 1 / inverse : kNoDepth;
+    }
+
+  private:
+    void findPixelsAtEdges() {
+        const glm::dvec2 scale(1.0 * coarse_.width() / picture_.width(),
+                               1.0 * coarse_.height() / picture_.height());
+        // Pixels of one sample have the same surfaces around them.
+        std::vector<SurfacesAround> ofRow(static_cast<std::size_t>(coarse_.width()));
+        std::vector<int> rowOf(ofRow.size(), -1);
+        for (int y = top_; y < top_ + index_.height(); ++y) {
+            for (int x = 0; x < index_.width(); ++x) {
+                const glm::dvec2 at = (glm::dvec2(x, y) + 0.5) * scale - 0.5;
+                float inverse = 0;
+                const bool one = coarse_.isOneSurface(at, inverse);
+                inverse_.at(x, y - top_) = inverse;
+                if (one) continue;
+                const glm::ivec2 middle(
+                    glm::clamp(glm::round(at), glm::dvec2(0),
+                               glm::dvec2(coarse_.width() - 1, coarse_.height() - 1)));
+                const auto k = static_cast<std::size_t>(middle.x);
+                if (rowOf[k] != middle.y) {
+                    rowOf[k] = middle.y;
+                    ofRow[k] = coarse_.surfacesAround(middle.x, middle.y);
+                }
+                addPixel({x, y}, at, middle, ofRow[k]);
+            }
+        }
+    }
+
+    void addPixel(glm::ivec2 pixel, glm::dvec2 at, glm::ivec2 middle,
+                  const SurfacesAround& around) {
+        RaisedPixel out;
+        out.x = pixel.x;
+        out.y = pixel.y;
+        out.count = around.count;
+        const glm::vec2 off(at - glm::dvec2(middle));
+        for (int k = 0; k < around.count; ++k) {
+            const auto n = static_cast<std::size_t>(k);
+            out.inverse[n] = around.surfaces[n].at(off.x, off.y);
+        }
+        if (around.count == 1) {
+            inverse_.at(pixel.x, pixel.y - top_) = out.inverse[0];
+            return;
+        }
+        out.cost = coarse_.costs(around, middle, at, glm::vec3(picture_.at(pixel.x, pixel.y)));
+        index_.at(pixel.x, pixel.y - top_) = static_cast<int>(pixels_.size());
+        pixels_.push_back(out);
+    }
+
+    /// Finds the neighbours of a pixel; of those on one surface it hears at once.
+    void link(RaisedPixel& pixel) {
+        static constexpr int kWays[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+        const glm::vec3 own(picture_.at(pixel.x, pixel.y));
+        for (std::size_t way = 0; way < 4; ++way) {
+            const int x = pixel.x + kWays[way][0], y = pixel.y + kWays[way][1];
+            if (!index_.contains(x, y - top_)) continue;
+            const glm::vec3 unlike = glm::vec3(picture_.at(x, y)) - own;
+            pixel.apart[way] = kApart * (kApartAnyway + std::exp(-glm::dot(unlike, unlike) /
+                                                                 (2 * kEdgeColour * kEdgeColour)));
+            pixel.beside[way] = index_.at(x, y - top_);
+            if (pixel.beside[way] >= 0) continue;
+            for (int k = 0; k < pixel.count; ++k) {
+                const auto n = static_cast<std::size_t>(k);
+                pixel.cost[n] +=
+                    pixel.apart[way] * costOfStep(pixel.inverse[n], inverse_.at(x, y - top_));
+            }
+        }
+    }
+
+    static PerSurface costsOf(const RaisedPixel& pixel) {
+        PerSurface sum = pixel.cost;
+        for (const PerSurface& heard : pixel.heard)
+            for (std::size_t n = 0; n < sum.size(); ++n) sum[n] += heard[n];
+        return sum;
+    }
+
+    /// Says to each neighbour what each of its surfaces would cost here.
+    void tell(const RaisedPixel& pixel) {
+        const PerSurface sum = costsOf(pixel);
+        for (std::size_t way = 0; way < 4; ++way) {
+            if (pixel.beside[way] < 0) continue;
+            RaisedPixel& other = pixels_[static_cast<std::size_t>(pixel.beside[way])];
+            PerSurface& out = other.heard[way ^ 1];
+            float least = std::numeric_limits<float>::max();
+            for (int l = 0; l < other.count; ++l) {
+                const auto m = static_cast<std::size_t>(l);
+                float best = std::numeric_limits<float>::max();
+                for (int k = 0; k < pixel.count; ++k) {
+                    const auto n = static_cast<std::size_t>(k);
+                    best = std::min(best, sum[n] - pixel.heard[way][n] +
+                                              pixel.apart[way] *
+                                                  costOfStep(pixel.inverse[n], other.inverse[m]));
+                }
+                out[m] = best;
+                least = std::min(least, best);
+            }
+            for (int l = 0; l < other.count; ++l) out[static_cast<std::size_t>(l)] -= least;
+        }
+    }
+
+    static std::size_t bestOf(const RaisedPixel& pixel) {
+        const PerSurface sum = costsOf(pixel);
+        return static_cast<std::size_t>(std::min_element(sum.begin(), sum.begin() + pixel.count) -
+                                        sum.begin());
+    }
+
+    const CoarseDepth& coarse_;
+    const Texture& picture_;
+    int top_;
+    Image<int> index_;      ///< of pixels_, or -1
+    Image<float> inverse_;  ///< 1/z; 0: no depth
+    std::vector<RaisedPixel> pixels_;
+};
 
 }  // namespace
 
-Image<float> raiseDepth(const Image<float>& depth, const Texture& picture, const Texture& coarse) {
+Image<float> raiseDepth(const Image<float>& depth, const Texture& picture,
+                        const Image<std::uint8_t>* matte) {
+    const CoarseDepth coarse(depth, picture, matte);
     const int width = picture.width(), height = picture.height();
-    const int dw = depth.width(), dh = depth.height();
     Image<float> out(width, height, kNoDepth);
-    parallelForBlocks(0, height, 16, [&](std::int64_t firstRow, std::int64_t lastRow) {
-        for (int y = static_cast<int>(firstRow); y < lastRow; ++y) {
-            for (int x = 0; x < width; ++x) {
-                const double px = (x + 0.5) * dw / width - 0.5, py = (y + 0.5) * dh / height - 0.5;
-                const int ix = static_cast<int>(std::floor(px)),
-                          iy = static_cast<int>(std::floor(py));
-                float low = kNoDepth, high = 0;
-                double inverse = 0;
-                for (int j = 0; j < 2; ++j)
-                    for (int i = 0; i < 2; ++i) {
-                        const float d =
-                            depth.at(std::clamp(ix + i, 0, dw - 1), std::clamp(iy + j, 0, dh - 1));
-                        low = std::min(low, d);
-                        high = std::max(high, d);
-                        inverse += (i ? px - ix : 1 - (px - ix)) * (j ? py - iy : 1 - (py - iy)) /
-                                   static_cast<double>(d);
-                    }
-                if (hasPoint(high) && high - low <= kAlikeDepth * low) {
-                    out.at(x, y) = static_cast<float>(1.0 / inverse);
-                    continue;
-                }
-                std::array<DepthSample, 16> samples;
-                const glm::vec3 own(picture.at(x, y));
-                for (int j = 0; j < 4; ++j)
-                    for (int i = 0; i < 4; ++i) {
-                        const int sx = std::clamp(ix - 1 + i, 0, dw - 1),
-                                  sy = std::clamp(iy - 1 + j, 0, dh - 1);
-                        const glm::dvec2 away(ix - 1 + i - px, iy - 1 + j - py);
-                        const glm::dvec3 unlike(glm::vec3(coarse.at(sx, sy)) - own);
-                        samples[static_cast<std::size_t>(4 * j + i)] = {
-                            away.x, away.y, depth.at(sx, sy),
-                            std::exp(-glm::dot(away, away) / (2 * kNear * kNear) -
-                                     glm::dot(unlike, unlike) / (2 * kAlike * kAlike)) +
-                                1e-9};
-                    }
-                out.at(x, y) = atEdge(samples);
-            }
-        }
+    // Strips are always the same ones, so that bytes do not depend on the number of threads.
+    parallelFor(0, (height + kStripRows - 1) / kStripRows, [&](std::int64_t k) {
+        const int from = static_cast<int>(k) * kStripRows, to = std::min(height, from + kStripRows);
+        RaisedStrip strip(coarse, picture, std::max(0, from - kMarginRows),
+                          std::min(height, to + kMarginRows));
+        strip.run();
+        for (int y = from; y < to; ++y)
+            for (int x = 0; x < width; ++x) out.at(x, y) = strip.depthAt(x, y);
     });
     return out;
 }

@@ -223,35 +223,55 @@ bool alphaFollowsDepth(const Rgba8Image& texture, const Image<float>& depth, boo
     return true;
 }
 
-Rgba8Image padded(const Rgba8Image& image, const Padding& padding) {
-    if (!padding.any()) return image;
-    Rgba8Image out(image.width() + padding.left + padding.right,
-                   image.height() + padding.top + padding.bottom);
-    for (int y = 0; y < out.height(); ++y) {
-        for (int x = 0; x < out.width(); ++x) {
+namespace {
+
+/// Gives `put` the pixels of an image with padding around it, row by row.
+template <class Put>
+void eachPadded(const Rgba8Image& image, const Padding& padding, const Put& put) {
+    const int width = image.width() + padding.left + padding.right;
+    const int height = image.height() + padding.top + padding.bottom;
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
             const int fromX = x - padding.left, fromY = y - padding.top;
             glm::u8vec4 p = image.at(std::clamp(fromX, 0, image.width() - 1),
                                      std::clamp(fromY, 0, image.height() - 1));
             if (!image.contains(fromX, fromY)) p.a = 0;
-            out.at(x, y) = p;
+            put(p);
         }
     }
+}
+
+std::vector<std::uint8_t> paddedRgb(const Rgba8Image& image, const Padding& padding) {
+    std::vector<std::uint8_t> rgb;
+    rgb.reserve(static_cast<std::size_t>(image.width() + padding.left + padding.right) *
+                (image.height() + padding.top + padding.bottom) * 3);
+    eachPadded(image, padding, [&](glm::u8vec4 p) { rgb.insert(rgb.end(), {p.r, p.g, p.b}); });
+    return rgb;
+}
+
+}  // namespace
+
+Rgba8Image padded(const Rgba8Image& image, const Padding& padding) {
+    if (!padding.any()) return image;
+    Rgba8Image out(image.width() + padding.left + padding.right,
+                   image.height() + padding.top + padding.bottom);
+    glm::u8vec4* to = out.data();
+    eachPadded(image, padding, [&](glm::u8vec4 p) { *to++ = p; });
     return out;
 }
 
-Result<Bytes> colourPng(const Rgba8Image& image, bool alpha) {
-    if (alpha) return encodePng(image.width(), image.height(), 4, 8, image.data(), true);
-    std::vector<std::uint8_t> rgb;
-    rgb.reserve(image.count() * 3);
-    for (const glm::u8vec4 p : image.pixels()) rgb.insert(rgb.end(), {p.r, p.g, p.b});
-    return encodePng(image.width(), image.height(), 3, 8, rgb.data(), true);
+Result<Bytes> colourPng(const Rgba8Image& image, bool alpha, const Padding& padding) {
+    const int width = image.width() + padding.left + padding.right;
+    const int height = image.height() + padding.top + padding.bottom;
+    if (!alpha) return encodePng(width, height, 3, 8, paddedRgb(image, padding).data(), true);
+    if (!padding.any()) return encodePng(width, height, 4, 8, image.data(), true);
+    return encodePng(width, height, 4, 8, padded(image, padding).data(), true);
 }
 
-Result<Bytes> colourJpeg(const Rgba8Image& image, int quality) {
-    std::vector<std::uint8_t> rgb;
-    rgb.reserve(image.count() * 3);
-    for (const glm::u8vec4 p : image.pixels()) rgb.insert(rgb.end(), {p.r, p.g, p.b});
-    return encodeJpeg(image.width(), image.height(), 3, rgb.data(), quality);
+Result<Bytes> colourJpeg(const Rgba8Image& image, int quality, const Padding& padding) {
+    return encodeJpeg(image.width() + padding.left + padding.right,
+                      image.height() + padding.top + padding.bottom, 3,
+                      paddedRgb(image, padding).data(), quality);
 }
 
 }  // namespace stx::mpeg4

@@ -52,8 +52,11 @@ namespace stx::mpeg4 {
                                      bool prunedToo = false);
 /// An image with `padding` around it, its edge repeated (alpha 0 in what is new).
 [[nodiscard]] Rgba8Image padded(const Rgba8Image& image, const Padding& padding);
-/// PNG of colour, with alpha when asked.
-[[nodiscard]] Result<Bytes> colourPng(const Rgba8Image& image, bool alpha);
-[[nodiscard]] Result<Bytes> colourJpeg(const Rgba8Image& image, int quality);
+/// PNG of colour, with alpha when asked, and JPEG; of what padded() gives, without the memory for
+/// it.
+[[nodiscard]] Result<Bytes> colourPng(const Rgba8Image& image, bool alpha,
+                                      const Padding& padding = {});
+[[nodiscard]] Result<Bytes> colourJpeg(const Rgba8Image& image, int quality,
+                                       const Padding& padding = {});
 
 }  // namespace stx::mpeg4

@@ -67,18 +67,20 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
         return out;
     }
     STX_TRY(out.depth, depthPng(view.depth, code, out.padding, out.worstDepth));
-    const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
+    // Copies of large pictures would be half of the memory of writing.
+    Rgba8Image coded;
+    if (view.texture.isLinear()) coded = rgba8FromTexture(view.texture, out.clamped);
+    const Rgba8Image& colour = view.texture.isLinear() ? coded : *view.texture.rgba8();
     const bool alpha = !alphaFollowsDepth(colour, view.depth);
     if (mayBeUnknown) out.unknown = options.h264 >= 0 ? kUnknownAll : kUnknownInAlpha;
-    const Rgba8Image wide = padded(colour, out.padding);
     if (options.texture == SceneWriteOptions::Texture::jpeg) {
         out.coverageLost = !alphaFollowsDepth(colour, view.depth, mayBeUnknown);
         if (mayBeUnknown) {
             STX_TRY(out.unknown, unknownMask(colour, view.depth));
         }
-        STX_TRY(out.texture, colourJpeg(wide, options.jpegQuality));
+        STX_TRY(out.texture, colourJpeg(colour, options.jpegQuality, out.padding));
     } else {
-        STX_TRY(out.texture, colourPng(wide, alpha));
+        STX_TRY(out.texture, colourPng(colour, alpha, out.padding));
     }
     if (!isWrittenAsV2(view, options)) return out;
     if (view.hasNormals()) {

@@ -44,12 +44,18 @@ bool isSharp(const Photo& photo) {
 
 }  // namespace
 
-TEST(MadePhotos, AppleJpegTakesTheDepthAndPassesTheMatteOver) {
+TEST(MadePhotos, AppleJpegTakesTheDepthAndTheMatteOfAPortrait) {
     const auto photo = open(made::applePhoto());
     ASSERT_TRUE(photo) << photo.error().text();
     EXPECT_EQ(photo->format, "Apple JPEG");
     EXPECT_EQ(photo->accuracy, "absolute");
     EXPECT_EQ(photo->mattes, std::vector<std::string>{"portraiteffectsmatte"});
+    EXPECT_EQ(photo->matte.width, 8);
+    Job job;
+    const auto matte = decodeMatte(*photo, job);
+    ASSERT_TRUE(matte) << matte.error().text();
+    EXPECT_EQ(matte->height(), 6);
+    EXPECT_NEAR(matte->at(6, 3), 6 * 8 + 120, 3);
     ASSERT_TRUE(photo->intrinsics);
     EXPECT_DOUBLE_EQ(photo->intrinsics->fx, 30);
     EXPECT_DOUBLE_EQ(photo->intrinsics->cx, 17);
@@ -57,6 +63,20 @@ TEST(MadePhotos, AppleJpegTakesTheDepthAndPassesTheMatteOver) {
     // Code 8 x of 255 between 0.5 and 2 per unit; JPEG is off by a code or two.
     EXPECT_NEAR(z.at(0, 0), 2, 0.03);
     EXPECT_NEAR(1 / z.at(10, 3), 0.5 + 1.5 * 80 / 255, 0.02);
+}
+
+TEST(MadePhotos, AMatteOfAnotherShapeOrLargerThanThePictureIsPassedOver) {
+    for (const glm::ivec2 size : {glm::ivec2(8, 7), glm::ivec2(64, 48)}) {
+        const auto photo = open(
+            made::mpf(made::colourJpeg(),
+                      {made::withSegments(made::depthJpeg(size.x, size.y),
+                                          {made::xmpSegment(made::matteXmp())}),
+                       made::withSegments(made::depthJpeg(), {made::xmpSegment(made::appleXmp())})},
+                      {}));
+        ASSERT_TRUE(photo) << photo.error().text();
+        EXPECT_EQ(photo->mattes.size(), 1u);
+        EXPECT_EQ(photo->matte.coding, PhotoImage::Coding::none);
+    }
 }
 
 TEST(MadePhotos, AreTurnedUprightWithTheirCamera) {

@@ -132,6 +132,21 @@ TEST(PhotosOfPhones, HeicDepthIsThatOfAnotherDecoderToTheBit) {
     EXPECT_TRUE(two->set.views.front().camera == read->set.views.front().camera);
 }
 
+TEST(PhotosOfPhones, AMatteTellsWhereAPersonIs) {
+    REQUIRE_SHARED(file, "data/phones/apple-heic/selfie-mattes.heic");
+    const auto read = readPhoto(file);
+    if (!read && lacksHeif(read.error())) GTEST_SKIP() << read.error().text();
+    ASSERT_TRUE(read) << read.error().text();
+    const auto& matte = read->stored.matte;
+    ASSERT_EQ(matte.width(), 1158);
+    ASSERT_EQ(matte.height(), 1544);
+    // Chin and shoulders, and the wall beside and above them.
+    for (const glm::ivec2 at : {glm::ivec2(520, 640), {300, 1400}, {1000, 1400}})
+        EXPECT_GT(matte.at(at.x, at.y), 250);
+    for (const glm::ivec2 at : {glm::ivec2(100, 640), {520, 200}, {1000, 640}})
+        EXPECT_LT(matte.at(at.x, at.y), 5);
+}
+
 TEST(PhotosOfPhones, MadeFilesGiveTheirDepthBack) {
     REQUIRE_SHARED(truth, "data/phones/made/depth-in-made-files.jpg");
     const auto depth = decodeImage(readFile(truth, Limits()).value(), "jpeg", Limits());
