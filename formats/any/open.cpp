@@ -156,6 +156,11 @@ Result<std::variant<Mesh, std::unique_ptr<ViewTable>>> openMeshOrViews(const fs:
             if (table) return Opened(std::move(table));
         }
     }
+    if (kind == FileKind::imageSet || !options.set.from.empty()) {
+        STX_CHECK(checkObject(path, FileKind::imageSet, options));
+        STX_TRY(auto table, openSetViews(path, options.set, job, heldOfSets(job.limits)));
+        return Opened(std::move(table));
+    }
     STX_TRY(auto opened, openRenderable(path, options, job));
     if (auto* mesh = std::get_if<Mesh>(&opened)) return Opened(std::move(*mesh));
     return Opened(tableOf(std::move(std::get<Bundle>(opened))));
