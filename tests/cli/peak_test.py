@@ -101,6 +101,7 @@ def of_many():
         yield f"bake {kind}", f"bake {{}}.{kind} -o OUT.{kind}"
         yield f"extract {kind}", f"extract {{}}.{kind} -o OUT"
         yield f"sheet {kind}", f"sheet {{}}.{kind} -o OUT.png"
+        yield f"points {kind}", f"extract {{}}.{kind} -o OUT.ply"
         yield f"validate {kind}", f"validate {{}}.{kind}"
     yield "set to exr", "convert SET -o OUT.exr"
     yield "set to mp4", "convert SET -o OUT.mp4"
@@ -224,6 +225,14 @@ def pruned_one_by_one(args, folder):
             print(f"{name:46} {peak:6.1f} MiB, {each:.1f} bytes a pixel", flush=True)
         elif each > PRUNE:
             wrong.append(f"{name}: {peak:.1f} MiB, {each:.1f} bytes a pixel")
+        if not options:
+            found = json.loads(must([args.stx, "info", "many36.exr", "--memory", "--threads", "2", "--format", "json"], folder).out)
+            said, = (row["bytes"] / (1 << 20) for row in found["memory"]["commands"] if row["command"] == "pack")
+            if args.measure:
+                print(f"{name:46} {said:6.1f} MiB by stx info --memory", flush=True)
+            # The pages are 24 bytes a pixel at most, of views in memory 32.
+            elif not peak - PROGRAM <= said <= 1.7 * peak:
+                wrong.append(f"{name}: {peak:.1f} MiB, but stx info --memory says {said:.1f}")
     return wrong
 
 
