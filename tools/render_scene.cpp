@@ -7,6 +7,7 @@
 #include "formats/any/open.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/files/files.hpp"
+#include "formats/imagesets/set_views.hpp"
 #include "lib/model/median_distance.hpp"
 #include "lib/model/peak_memory.hpp"
 #include "lib/model/splat_cloud.hpp"

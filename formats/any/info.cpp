@@ -10,6 +10,7 @@
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/files/numbered.hpp"
+#include "formats/imagesets/set_views.hpp"
 #include "formats/imagesets/summary.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/mpeg4/mapping/background.hpp"

@@ -10,6 +10,7 @@
 #include "formats/imagesets/patterns.hpp"
 #include "formats/imagesets/read_views.hpp"
 #include "formats/imagesets/recognise.hpp"
+#include "formats/imagesets/set_views.hpp"
 #include "lib/geometry/origin.hpp"
 #include "lib/model/sequence.hpp"
 

@@ -12,7 +12,6 @@
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/sequence.hpp"
-#include "lib/model/view_table.hpp"
 #include "lib/refine/refine.hpp"
 
 /// Photographs with depth and cameras, as other programs leave them. Axes, pixel centres and the
@@ -107,18 +106,6 @@ struct ImageSetKind {
 /// this kind needs or does not have), invalidInput with file and line or key.
 [[nodiscard]] Result<Bundle> readImageSet(const std::filesystem::path& path,
                                           const ImageSetOptions& options, Job& job);
-
-/// Images of a set that take no more than so many bytes are all in memory when it is opened as a
-/// table: that is faster than to read each picture twice, and hardly shows beside the program.
-[[nodiscard]] std::uint64_t heldOfSets(const Limits& limits);
-/// The same views as a table. Of a set of one moment whose images take more than `held` bytes, each
-/// view is read once here, for its planes and marks, and again when it is asked for; a file that
-/// changes meanwhile is an error (invalidInput). Views that are taken together are in memory all
-/// the same: where poses are refined, panoramas, and frames of films. That views disagree is noted
-/// when the last of them has been asked for.
-[[nodiscard]] Result<std::unique_ptr<ViewTable>> openSetViews(const std::filesystem::path& path,
-                                                              const ImageSetOptions& options,
-                                                              Job& job, std::uint64_t held);
 
 /// All frames of a set, one of a set without time. Which pictures belong to one camera the set says
 /// (`camera` of transforms.json); else those of one pose do, and where no pose comes twice, one

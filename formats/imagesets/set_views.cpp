@@ -117,13 +117,17 @@ std::optional<std::uint64_t> memoryOfImages(const SetDescription& set) {
     return bytes;
 }
 
-/// How many views may be read at a time under the limit, by the largest whose size is known.
-std::size_t viewsAtOnce(const SetDescription& set, const Limits& limits) {
+/// How many views may be read at a time under the limit, by the largest whose size is known. Errors
+/// (invalidInput): not even that one.
+Result<std::size_t> viewsAtOnce(const SetDescription& set, const Limits& limits) {
     std::uint64_t most = 1;
     for (const SetView& view : set.views) {
         const auto pixels = static_cast<std::uint64_t>(std::max(view.camera.width, 0)) *
                             static_cast<std::uint64_t>(std::max(view.camera.height, 0));
-        most = std::max(most, pixels * (2 * (sizeof(float) + sizeof(glm::u8vec4)) + kReadingTakes));
+        const std::uint64_t takes =
+            pixels * (2 * (sizeof(float) + sizeof(glm::u8vec4)) + kReadingTakes);
+        STX_CHECK(checkPeak({"reading", 0}, pixels, pixels, takes, limits));
+        most = std::max(most, takes);
     }
     return static_cast<std::size_t>(std::clamp<std::uint64_t>(
         limits.maxMemoryBytes / most, 1, static_cast<std::uint64_t>(threadCount())));
@@ -160,8 +164,8 @@ Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::s
         looked.disagreement->sample(i, view.depth);
         return {};
     };
-    STX_TRY(const RefineReport report,
-            loadEach(set, where, options, viewsAtOnce(set, job.limits), job, nullptr, look));
+    STX_TRY(const std::size_t atOnce, within(where, viewsAtOnce(set, job.limits)));
+    STX_TRY(const RefineReport report, loadEach(set, where, options, atOnce, job, nullptr, look));
     makeNamesUnique(headers.views);
     looked.linear = std::ranges::any_of(looked.kinds, &ViewImageKinds::linear);
     for (ViewImageKinds& kinds : looked.kinds) kinds.linear = looked.linear;

@@ -1,6 +1,7 @@
 #include "formats/any/open.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/imagesets/image_sets.hpp"
+#include "formats/imagesets/set_views.hpp"
 #include "formats/imagesets/summary.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/validate/findings.hpp"

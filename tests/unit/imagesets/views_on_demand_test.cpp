@@ -5,6 +5,7 @@
 #include <chrono>
 
 #include "formats/imagesets/export.hpp"
+#include "formats/imagesets/set_views.hpp"
 #include "lib/model/same_pictures.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
@@ -188,6 +189,20 @@ TEST(SetViewsOnDemand, AreNotReadFromAFileThatHasChanged) {
     const auto gone = (*table)->view(2, job);
     ASSERT_FALSE(gone);
     EXPECT_EQ(gone.error().code, ErrorCode::invalidInput);
+}
+
+TEST(SetViewsOnDemand, AreRefusedBeforeTheyAreReadWhereOneDoesNotFit) {
+    const TemporaryFolder folder;
+    writeRoom(folder, "");
+    // It is not read, or this would be the error.
+    writeText(folder / "c0.png", "no picture");
+    Job job;
+    job.limits.maxMemoryBytes = 96 * 64 * 12;
+    const auto table = openSetViews(folder.path(), {}, job, kNoneHeld);
+    ASSERT_FALSE(table);
+    EXPECT_EQ(table.error().code, ErrorCode::invalidInput);
+    EXPECT_NE(table.error().text().find("more than the memory limit"), std::string::npos)
+        << table.error().text();
 }
 
 TEST(SetViewsOnDemand, ThatCannotBeReadAreErrorsAtOnce) {
