@@ -51,6 +51,7 @@ void DisagreementByView::sample(std::size_t index, const Image<float>& depth) {
     view.probes =
         registration::gridOfPoints(depth, registration::probesAmong(state_->views.size()));
     view.measured = registration::gridOfPoints(depth, registration::kMeasured);
+    view.measured.points.shrink_to_fit();  // all views have one
 }
 
 bool DisagreementByView::compare(std::size_t index, const Image<float>& depth,
@@ -84,7 +85,9 @@ bool DisagreementByView::compare(std::size_t index, const Image<float>& depth,
             from.pairs.pop_back();
     }
     const std::lock_guard lock(state.mutex);
-    return --state.left == 0;
+    if (--state.left > 0) return false;
+    for (State::OfView& view : state.views) view.probes = view.measured = {};
+    return true;
 }
 
 DepthDisagreement DisagreementByView::result() const {
