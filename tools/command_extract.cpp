@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -8,6 +10,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/base/stopwatch.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/model/view_table.hpp"
 #include "tools/commands.hpp"
 #include "tools/extract_shown.hpp"
 #include "tools/extract_splats.hpp"
@@ -35,10 +38,21 @@ struct ExtractOptions {
     OpenOptions open;
 };
 
-/// All points of a bundle, view by view, as flat arrays.
+/// Points as flat arrays.
 struct Points {
     std::vector<glm::vec3> positions, normals;
     std::vector<glm::u8vec4> colours;
+
+    /// Those of a view, row by row.
+    void add(const ReferenceView& view, bool withNormals);
+    [[nodiscard]] PointCloud cloud(const glm::dvec3& origin) const {
+        PointCloud out;
+        out.positions = positions;
+        out.colours = colours;
+        out.normals = normals;
+        out.origin = origin;
+        return out;
+    }
 };
 
 glm::u8vec4 codedColour(const Texture& texture, int x, int y) {
@@ -50,23 +64,39 @@ glm::u8vec4 codedColour(const Texture& texture, int x, int y) {
     return {coded(c.x), coded(c.y), coded(c.z), 255};
 }
 
-Points pointsOf(const Bundle& bundle) {
-    bool normals = true;
-    for (const auto& view : bundle.views) normals = normals && view.hasNormals();
-    Points out;
-    for (const auto& view : bundle.views) {
-        for (int y = 0; y < view.depth.height(); ++y) {
-            for (int x = 0; x < view.depth.width(); ++x) {
-                if (!hasPoint(view.depth.at(x, y))) continue;
-                out.positions.emplace_back(view.worldPoint(x, y));
-                auto colour = codedColour(view.texture, x, y);
-                colour.w = 255;
-                out.colours.push_back(colour);
-                if (normals) out.normals.push_back(view.normal.at(x, y));
-            }
+void Points::add(const ReferenceView& view, bool withNormals) {
+    for (int y = 0; y < view.depth.height(); ++y) {
+        for (int x = 0; x < view.depth.width(); ++x) {
+            if (!hasPoint(view.depth.at(x, y))) continue;
+            positions.emplace_back(view.worldPoint(x, y));
+            auto colour = codedColour(view.texture, x, y);
+            colour.w = 255;
+            colours.push_back(colour);
+            if (withNormals) normals.push_back(view.normal.at(x, y));
         }
     }
-    return out;
+}
+
+/// How many points views have. Where their file does not say it, they are read for that.
+Result<std::size_t> countPoints(const ViewTable& table, Job& job) {
+    std::vector<std::int64_t> points(table.count());
+    if (const auto summaries = table.summaries(); !summaries.empty()) {
+        std::ranges::transform(summaries, points.begin(), &ViewSummary::points);
+    } else {
+        // What there is to say is said when they are read again.
+        Job quiet;
+        quiet.workFor(job);
+        STX_CHECK(forEachView(
+            table, {"points", 0}, quiet,
+            [&](std::size_t i, const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
+                points[i] = view->pointCount();
+                return {};
+            }));
+    }
+    std::size_t all = 0;
+    for (const std::int64_t n : points)
+        all += static_cast<std::size_t>(std::max<std::int64_t>(n, 0));
+    return all;
 }
 
 /// Who asks for fewer triangles wants a small file, and has given up the exact one.
@@ -144,19 +174,42 @@ struct Extracted {
     std::int64_t points = 0;
 };
 
+/// A .ply, view by view.
+Result<Extracted> extractPly(const ExtractOptions& o, const PeakMemory& takes, Sequence& frames,
+                             std::size_t moment, Program& program) {
+    STX_TRY(const auto table, frames.views(moment, program.job));
+    const bool normals = std::ranges::all_of(table->kinds(), &ViewImageKinds::normal);
+    const glm::dvec3 origin = std::as_const(*table).about().origin;
+    keepFreedMemory();  // of a view, for the next one
+    STX_TRY(const std::size_t count, countPoints(*table, program.job));
+    STX_TRY(auto file, PlyInParts::create(o.output, {count, normals, true, false, origin},
+                                          program.outputOptions()));
+    std::vector<Bytes> rows(table->count());
+    const auto encode = [&](std::size_t i,
+                            const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
+        Points points;
+        points.add(*view, normals);
+        STX_TRY(rows[i], file.encode(points.cloud(origin)));
+        return {};
+    };
+    const auto add = [&](std::size_t i) -> Result<void> {
+        return file.add(std::exchange(rows[i], Bytes()));
+    };
+    STX_CHECK(forEachView(*table, takes, program.job, encode, add));
+    STX_CHECK(file.commit());
+    return Extracted{counted(count, "point"), table->count(), static_cast<std::int64_t>(count)};
+}
+
 Result<Extracted> extractPoints(const ExtractOptions& o, const PeakMemory& takes, Sequence& frames,
                                 std::size_t moment, Program& program) {
     STX_TRY(const auto bundle, frames.frame(moment, program.job));
     STX_CHECK(checkPeak(takes, bundle.views, program.job.limits));
-    const auto found = pointsOf(bundle);
-    PointCloud cloud;
-    cloud.positions = found.positions;
-    cloud.colours = found.colours;
-    cloud.normals = found.normals;
-    cloud.origin = bundle.origin;
+    const bool normals = std::ranges::all_of(bundle.views, &ReferenceView::hasNormals);
+    Points found;
+    for (const ReferenceView& view : bundle.views) found.add(view, normals);
     PointWriteOptions write = o.points;
     write.file.noClobber = program.common.noClobber;
-    STX_CHECK(writePoints(o.output, cloud, program.job, write));
+    STX_CHECK(writePoints(o.output, found.cloud(bundle.origin), program.job, write));
     return Extracted{counted(found.positions.size(), "point"), bundle.views.size(),
                      bundle.pointCount()};
 }
@@ -216,7 +269,8 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
                      program.job));
     Extracted out;
     if (wanted.points) {
-        STX_TRY(out, extractPoints(o, takes, *frames, moment, program));
+        STX_TRY(out, (wanted.ending == ".ply" ? extractPly : extractPoints)(o, takes, *frames,
+                                                                            moment, program));
     } else {
         STX_TRY(out, extractFolder(o, std::move(frames), moment, program));
     }

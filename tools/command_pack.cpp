@@ -20,6 +20,9 @@
 namespace stx::tools {
 namespace {
 
+/// Of views in memory; pages are a little larger, by their padding.
+constexpr PeakMemory kPacking = {peak::kAtlas.what, peak::kAtlas.perPixel + 4};
+
 struct PackOptions {
     std::vector<std::string> inputs;
     std::string input, output;  ///< of one
@@ -269,7 +272,7 @@ Result<PackObject> openObject(const PackOptions& o, const std::string& input,
                               const std::string& name, Job& job) {
     preloadCodecs(input);
     STX_TRY(auto frames, openSequence(input, o.open.into(o.output), job));
-    STX_TRY(frames, refined(std::move(frames), o.refine, peak::kAtlas));
+    STX_TRY(frames, refined(std::move(frames), o.refine, kPacking));
     const Timeline timeline = frames->timeline();
     std::size_t moment = 0;
     if (timeline.moves()) {
@@ -364,7 +367,7 @@ Result<int> packInput(const PackOptions& options, Program& program) {
     // One atlas for each frame is made in two passes.
     const bool twice = frames->timeline().moves() && !o.time;
     STX_TRY(frames,
-            refined(std::move(frames), o.refine, peak::kAtlas, twice ? folderOf(o.output) : ""));
+            refined(std::move(frames), o.refine, kPacking, twice ? folderOf(o.output) : ""));
     const Timeline timeline = frames->timeline();
     const std::size_t count = timeline.count();
     const bool numbered = frameName(o.output, 0).has_value();

@@ -117,10 +117,13 @@ Result<int> extractPicture(const std::string& input, const OpenOptions& open,
     STX_TRY(frames, refined(std::move(frames), refine, peak::kExport));
     STX_TRY(const auto moment,
             momentOf(time, frames->timeline(), "a picture is", input, program.job));
-    STX_TRY(const auto bundle, frames->frame(moment, program.job));
-    STX_CHECK(checkPeak(peak::kExport, bundle.views, program.job.limits));
-    STX_TRY(const std::size_t number, namedView(view, bundle.views));
-    const ReferenceView& shown = bundle.views[number];
+    STX_TRY(const auto table, frames->views(moment, program.job));
+    STX_TRY(const std::size_t number, namedView(view, std::as_const(*table).about().views));
+    const std::uint64_t pixels = table->pixelsOf(number);
+    STX_CHECK(checkPeak(peak::kExport, pixels, pixels,
+                        table->bytesHeld() + table->bytesToMake(number), program.job.limits));
+    STX_TRY(const auto read, table->view(number, program.job));
+    const ReferenceView& shown = *read;
     STX_CHECK(exportPicture(shown, output, kind, program.outputOptions(), program.job));
     const std::string what = fmt::format(
         "view {} '{}', {}x{}{}", number, shown.name, shown.depth.width(), shown.depth.height(),

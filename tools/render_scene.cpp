@@ -7,6 +7,7 @@
 #include "formats/any/open.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/files/files.hpp"
+#include "formats/imagesets/set_views.hpp"
 #include "lib/model/median_distance.hpp"
 #include "lib/model/peak_memory.hpp"
 #include "lib/model/splat_cloud.hpp"
@@ -111,12 +112,20 @@ bool mayChoose(const RenderOptions& o, const ViewTable& table) {
 Result<void> openStill(const RenderOptions& o, const RenderSettings& settings, DrawnScene& scene,
                        Job& job) {
     STX_TRY(const auto kind, recognise(o.input));
-    if (!o.open.set.from.empty() || (kind != FileKind::exr && kind != FileKind::mpeg4)) {
+    std::unique_ptr<ViewTable> table;
+    if (!o.open.set.from.empty() || kind == FileKind::imageSet) {
+        STX_CHECK(checkObject(o.input, FileKind::imageSet, o.open));
+        // Of what fits each picture is read once.
+        const ViewImageKinds usual;
+        const std::uint64_t each = usual.bytesPerPixel(), drawn = drawingMemory(settings).perPixel;
+        STX_TRY(table, openSetViews(o.input, o.open.set, job,
+                                    job.limits.maxMemoryBytes / (each + drawn) * each));
+    } else if (kind == FileKind::exr || kind == FileKind::mpeg4) {
+        STX_TRY(table, openViews(o.input, o.open, job));
+    } else {
         STX_TRY(scene.model, stx::open(o.input, o.open, job));
         return {};
     }
-    STX_TRY(auto opened, openMeshOrViews(o.input, o.open, job));
-    auto& table = std::get<std::unique_ptr<ViewTable>>(opened);
     scene.exact = tellWithoutPixels(table->about().views) && saidToBeExact(*table, settings.refine);
     if (scene.exact && mayChoose(o, *table)) {
         STX_TRY(scene.model,

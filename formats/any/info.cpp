@@ -10,6 +10,7 @@
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/files/numbered.hpp"
+#include "formats/imagesets/set_views.hpp"
 #include "formats/imagesets/summary.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/mpeg4/mapping/background.hpp"
@@ -414,6 +415,20 @@ Result<void> describeMesh(const fs::path& path, const InfoOptions& options, Json
     return {};
 }
 
+/// Whether what was described is an image set whose views are read when they are asked for, as far
+/// as that shows before it is read.
+bool setOnDemand(FileKind kind, const Json& out, const Limits& limits) {
+    if (kind != FileKind::imageSet || out.value("frames", 1) > 1) return false;
+    std::uint64_t bytes = 0;
+    const std::uint64_t each = ViewImageKinds().bytesPerPixel();
+    for (const auto& view : out["views"]) {
+        if (view.value("panorama", false)) return false;
+        bytes += each * static_cast<std::uint64_t>(std::max(view.value("width", 0), 0)) *
+                 static_cast<std::uint64_t>(std::max(view.value("height", 0), 0));
+    }
+    return out["views"].size() > 1 && bytes > heldOfSets(limits);
+}
+
 /// What takes more than headers: what of the pixels was asked for.
 Result<void> addMeasured(const fs::path& path, FileKind kind, const InfoOptions& options,
                          const OpenOptions& open, Json& out, Job& job) {
@@ -428,7 +443,7 @@ Result<void> addMeasured(const fs::path& path, FileKind kind, const InfoOptions&
     if (options.memory) {
         auto memory = [&]() -> Result<Json> {
             const bool onDemand = kind == FileKind::mpeg4 || out["container"] == "exr";
-            if (!onDemand) return memoryOfSizes(out["views"]);
+            if (!onDemand) return memoryOfSizes(out["views"], setOnDemand(kind, out, job.limits));
             STX_TRY(const auto table, openViews(path, open, job));
             return memoryJson(*table, job);
         }();

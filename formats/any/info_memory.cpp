@@ -6,39 +6,62 @@
 
 #include "lib/base/counted.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/packing/views_one_by_one.hpp"
 #include "lib/refine/refine_needed.hpp"
 
 namespace stx {
 namespace {
 
-/// What a command does with views, and whether it looks at one at a time where they come on demand.
+/// What a command does with views.
 struct ViewCommand {
     const char* words;
     const PeakMemory* takes;
     const PeakMemory* takesWithVectors;  ///< where views have normals or splats
-    bool oneByOne;
+    enum class Looks {
+        atEach,       ///< one at a time, where they come on demand
+        atRefined,    ///< the same, unless they are refined before, which looks at all
+        whilePacked,  ///< the same, beside the atlas
+        atAll,
+    } looks;
 };
 
 constexpr PeakMemory kNothingMore = {"reading", 0};
+using enum ViewCommand::Looks;
 constexpr ViewCommand kCommands[] = {
-    {"convert -o NAME.exr", &kNothingMore, &kNothingMore, true},
-    {"convert -o NAME.mp4", &peak::kMpeg4, &peak::kMpeg4Vectors, true},
-    {"bake -o NAME.exr", &peak::kBake, &peak::kBake, true},
-    {"bake -o NAME.mp4", &peak::kBakeToMpeg4, &peak::kBakeToMpeg4, true},
-    {"extract -o FOLDER", &peak::kExport, &peak::kExport, true},
-    {"sheet", &peak::kSheet, &peak::kSheet, true},
-    {"render", &peak::kSurfaceMode, &peak::kSurfaceMode, false},
-    {"render --mode splat", &peak::kSplatMode, &peak::kSplatMode, false},
-    {"render --light", &peak::kLitSurfaceMode, &peak::kLitSurfaceMode, false},
-    {"render --mode splat --light", &peak::kLitSplatMode, &peak::kLitSplatMode, false},
-    {"pack", &peak::kAtlas, &peak::kAtlas, false},
-    {"select", &peak::kSelect, &peak::kSelect, false},
-    {"refine", &peak::kRefine, &peak::kRefine, false},
-    {"extract -o NAME.ply", &peak::kPoints, &peak::kPoints, false},
-    {"extract -o NAME.ply --as splats", &peak::kSplats, &peak::kSplats, false},
-    {"extract -o NAME.glb", &peak::kSurfaces, &peak::kSurfaces, false},
-    {"extract -o NAME.html", &peak::kPage, &peak::kPage, false},
+    {"convert -o NAME.exr", &kNothingMore, &kNothingMore, atEach},
+    {"convert -o NAME.mp4", &peak::kMpeg4, &peak::kMpeg4Vectors, atEach},
+    {"bake -o NAME.exr", &peak::kBake, &peak::kBake, atEach},
+    {"bake -o NAME.mp4", &peak::kBakeToMpeg4, &peak::kBakeToMpeg4, atEach},
+    {"extract -o FOLDER", &peak::kExport, &peak::kExport, atRefined},
+    {"sheet", &peak::kSheet, &peak::kSheet, atRefined},
+    {"render", &peak::kSurfaceMode, &peak::kSurfaceMode, atAll},
+    {"render --mode splat", &peak::kSplatMode, &peak::kSplatMode, atAll},
+    {"render --light", &peak::kLitSurfaceMode, &peak::kLitSurfaceMode, atAll},
+    {"render --mode splat --light", &peak::kLitSplatMode, &peak::kLitSplatMode, atAll},
+    {"pack", &peak::kAtlas, &peak::kAtlas, whilePacked},
+    {"select", &peak::kSelect, &peak::kSelect, atAll},
+    {"refine", &peak::kRefine, &peak::kRefine, atAll},
+    {"extract -o NAME.ply", &peak::kPoints, &peak::kPoints, atRefined},
+    {"extract -o NAME.ply --as splats", &peak::kSplats, &peak::kSplats, atAll},
+    {"extract -o NAME.glb", &peak::kSurfaces, &peak::kSurfaces, atAll},
+    {"extract -o NAME.html", &peak::kPage, &peak::kPage, atAll},
 };
+
+/// Of one command; `each`: it looks at views one by one.
+std::uint64_t bytesOf(const ViewCommand& command, const PeakMemory& takes, const ViewTable& table,
+                      bool each, bool refines) {
+    if (command.looks == whilePacked) {
+        // All views at once are those in memory beside the pages.
+        const auto grid = memoryOfGrid(table, PackSettings());
+        std::uint64_t viewsBeside = 0;
+        for (std::size_t i = 0; !each && !table.whole() && i < table.count(); ++i)
+            viewsBeside += table.bytesOf(i);
+        if (grid)
+            return std::max(*grid + viewsBeside, refines ? memoryOfAll(table, peak::kRefine) : 0);
+    }
+    const std::uint64_t bytes = each ? memoryOfEach(table, takes) : memoryOfAll(table, takes);
+    return refines && !each ? std::max(bytes, memoryOfAll(table, peak::kRefine)) : bytes;
+}
 
 nlohmann::ordered_json memoryOf(const ViewTable& table, bool refines) {
     const bool vectors = std::ranges::any_of(
@@ -46,15 +69,26 @@ nlohmann::ordered_json memoryOf(const ViewTable& table, bool refines) {
     auto commands = nlohmann::ordered_json::array();
     for (const ViewCommand& command : kCommands) {
         const PeakMemory& takes = vectors ? *command.takesWithVectors : *command.takes;
-        const bool each = command.oneByOne && !table.whole() && !refines;
-        std::uint64_t bytes = each ? memoryOfEach(table, takes) : memoryOfAll(table, takes);
-        if (refines) bytes = std::max(bytes, memoryOfAll(table, peak::kRefine));
+        const bool each =
+            !table.whole() && command.looks != atAll && (command.looks == atEach || !refines);
         commands.push_back({{"command", command.words},
-                            {"bytes", bytes},
+                            {"bytes", bytesOf(command, takes, table, each, refines)},
                             {"views", each ? "one for each thread" : "all"}});
     }
     return {{"threads", threadCount()}, {"commands", std::move(commands)}};
 }
+
+/// Views of which only sizes are known.
+class SizesAlone : public ViewTable {
+  public:
+    SizesAlone(Bundle sizes, std::vector<ViewImageKinds> kinds)
+        : ViewTable(std::move(sizes), std::move(kinds)) {}
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t, Job&) const override {
+        return fail(ErrorCode::failed, "only its size is known");
+    }
+};
 
 }  // namespace
 
@@ -63,7 +97,7 @@ Result<nlohmann::ordered_json> memoryJson(const ViewTable& table, Job& job) {
     return memoryOf(table, refines);
 }
 
-Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views) {
+Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views, bool onDemand) {
     Bundle sizes;
     for (const auto& view : views) {
         Camera& camera = sizes.views.emplace_back().camera;
@@ -75,7 +109,9 @@ Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views
                         "memory that it takes is not, either; leave out --memory",
                         view.value("name", ""));
     }
-    return memoryOf(*viewsOf(sizes), true);
+    if (!onDemand) return memoryOf(*viewsOf(sizes), true);
+    std::vector<ViewImageKinds> kinds(sizes.views.size());
+    return memoryOf(SizesAlone(std::move(sizes), std::move(kinds)), true);
 }
 
 std::string memoryText(const nlohmann::ordered_json& memory) {

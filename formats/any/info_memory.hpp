@@ -14,9 +14,10 @@ namespace stx {
 /// once, one for each thread, to find whether they would be refined. Errors: reading.
 [[nodiscard]] Result<nlohmann::ordered_json> memoryJson(const ViewTable& table, Job& job);
 
-/// Of views of which only the sizes are known, those of the field "views"; a set is all in memory.
-/// Errors (invalidInput): a size is not known.
-[[nodiscard]] Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views);
+/// Of views of which only the sizes are known, those of the field "views", which may be refined.
+/// `onDemand`: they are read when they are asked for. Errors (invalidInput): a size is not known.
+[[nodiscard]] Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views,
+                                                           bool onDemand);
 
 /// The same for people, a row for each command.
 [[nodiscard]] std::string memoryText(const nlohmann::ordered_json& memory);

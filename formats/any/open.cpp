@@ -8,6 +8,7 @@
 #include "formats/files/not_there.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/imagesets/image_sets.hpp"
+#include "formats/imagesets/set_views.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/photos/photo.hpp"
@@ -155,6 +156,11 @@ Result<std::variant<Mesh, std::unique_ptr<ViewTable>>> openMeshOrViews(const fs:
             STX_TRY(auto table, openExrViews(path, job));
             if (table) return Opened(std::move(table));
         }
+    }
+    if (kind == FileKind::imageSet || !options.set.from.empty()) {
+        STX_CHECK(checkObject(path, FileKind::imageSet, options));
+        STX_TRY(auto table, openSetViews(path, options.set, job, heldOfSets(job.limits)));
+        return Opened(std::move(table));
     }
     STX_TRY(auto opened, openRenderable(path, options, job));
     if (auto* mesh = std::get_if<Mesh>(&opened)) return Opened(std::move(*mesh));

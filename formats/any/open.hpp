@@ -52,8 +52,8 @@ enum class FileKind {
                                                                 const OpenOptions& options,
                                                                 Job& job);
 
-/// The same; what is not a mesh is a table of views. Those of our OpenEXR bundles and of MPEG-4 are
-/// read when they are asked for, all others are in memory.
+/// The same; what is not a mesh is a table of views. Those of our OpenEXR bundles, of MPEG-4 and of
+/// large image sets are read when they are asked for, all others are in memory.
 [[nodiscard]] Result<std::variant<Mesh, std::unique_ptr<ViewTable>>> openMeshOrViews(
     const std::filesystem::path& path, const OpenOptions& options, Job& job);
 

@@ -212,6 +212,7 @@ Result<SetDescription> describeExr(const path& given, const ImageSetOptions&, Jo
         SetView view;
         view.name = all[i].view.name;
         view.texture.name = view.depth.name = all[i].file.filename().string();
+        view.texture.path = view.depth.path = all[i].file;
         STX_TRY(view.camera,
                 cameraOf(reader, all[i].view, beside, all[i].file.stem().string(), i, all.size()));
         view.load = [found = all[i]](const SetView&, Job& inner) {

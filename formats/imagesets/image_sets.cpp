@@ -2,22 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
-#include "formats/exr/environment_exr.hpp"
 #include "formats/files/messages.hpp"
 #include "formats/files/not_there.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/motion.hpp"
 #include "formats/imagesets/patterns.hpp"
+#include "formats/imagesets/read_views.hpp"
 #include "formats/imagesets/recognise.hpp"
-#include "lib/background/behind_photo.hpp"
-#include "lib/base/parallel.hpp"
+#include "formats/imagesets/set_views.hpp"
 #include "lib/geometry/origin.hpp"
 #include "lib/model/sequence.hpp"
-#include "lib/model/srgb8.hpp"
-#include "lib/refine/poses.hpp"
-#include "lib/registration/disagreement.hpp"
 
 namespace stx {
 namespace {
@@ -78,183 +73,6 @@ Result<void> checkOptions(const ImageSetOptions& o) {
                     "greatest",
                     o.depthMin, o.depthMax);
     return {};
-}
-
-/// Names become part and file names: each is there once.
-void makeNamesUnique(std::vector<ReferenceView>& views) {
-    std::set<std::string> taken;
-    for (ReferenceView& view : views) {
-        if (view.name.empty()) view.name = "view";
-        std::string name = view.name;
-        for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", view.name, i);
-        view.name = std::move(name);
-    }
-}
-
-/// Refines the poses where that is asked for, and says which views disagree.
-Result<void> attendToPoses(Bundle& bundle, const ImageSetOptions& options, RefineReport& report,
-                           Job& job) {
-    const bool refines = options.refine.atImport(RefineStep::poses, false);
-    if (refines) {
-        STX_TRY(report.of(RefineStep::poses), alignPoses(bundle, job));
-    }
-    if (const auto note = disagreementNote(bundle, measureDepthDisagreement(bundle), refines))
-        job.note(*note);
-    return {};
-}
-
-/// Cameras of an export of ours count from its origin, to the bit as they were.
-void useOrigin(SetDescription& set) {
-    if (!set.origin) return;
-    for (SetView& view : set.views) {
-        const glm::dvec3 local = view.camera.position - *set.origin;
-        // Equal but for the rounding of the sum, unless somebody moved the camera since.
-        const double slack = 1e-12 * (1 + glm::length(*set.origin));
-        view.camera.position =
-            view.localPosition && glm::distance(*view.localPosition, local) <= slack
-                ? *view.localPosition
-                : local;
-    }
-}
-
-/// Leaves out views whose files are not there, and says so. Errors when none is left, or `strict`.
-Result<void> dropMissing(SetDescription& set, bool strict, Job& job) {
-    const auto isMissing = [](const SetView& view) { return view.missing.has_value(); };
-    const auto first = std::ranges::find_if(set.views, isMissing);
-    if (first == set.views.end()) return {};
-    const auto all = set.views.size();
-    const Error error = *first->missing;
-    const auto dropped = std::erase_if(set.views, isMissing);
-    if (strict || set.views.empty()) return tl::unexpected(error);
-    job.note(fmt::format("{} of {} views {} left out, as files are missing; the first: {}", dropped,
-                         all, dropped == 1 ? "is" : "are", error.text()));
-    return {};
-}
-
-/// Errors with the first file of a view that is not there.
-Result<void> checkFilesAreThere(const SetDescription& set) {
-    for (const SetView& view : set.views)
-        for (const PictureSource* source : {&view.texture, &view.depth})
-            if (source->missing) return tl::unexpected(*source->missing);
-    return {};
-}
-
-/// Bounds, and an origin where the coordinates of a set are too large for floats.
-void findOrigin(Bundle& bundle, const SetDescription& set, Job& job) {
-    bundle.bounds = bundle.computeBounds();
-    if (set.origin) {
-        bundle.origin = *set.origin;
-        return;
-    }
-    const auto origin = originFor(*bundle.bounds);
-    if (origin == glm::dvec3(0.0)) return;
-    bundle.origin = origin;
-    for (ReferenceView& view : bundle.views) view.camera.position -= origin;
-    bundle.bounds = Bounds{bundle.bounds->min - origin, bundle.bounds->max - origin};
-    job.note(fmt::format(
-        "the coordinates are too large for 32-bit floats: the origin {} {} {} is subtracted, and "
-        "kept beside them",
-        origin.x, origin.y, origin.z));
-}
-
-/// What is known of a camera without a picture: its place and its size.
-void makeUnknown(ReferenceView& view) {
-    view.noDepth = NoDepth::unknown;
-    view.pruned = false;
-    std::ranges::fill(view.depth.pixels(), kNoDepth);
-    if (Rgba8Image* texture = view.texture.rgba8())
-        std::ranges::fill(texture->pixels(), glm::u8vec4(0, 0, 0, 255));
-    if (RgbaFloatImage* texture = view.texture.rgbaFloat())
-        std::ranges::fill(texture->pixels(), glm::vec4(0, 0, 0, 1));
-}
-
-/// Pictures of one bundle are all coded alike: where some hold linear light, the others' 8 bits
-/// become floats, too, of which they come back.
-void makeAllLinear(std::vector<ReferenceView>& views) {
-    const auto linear = [](const ReferenceView& view) { return view.texture.isLinear(); };
-    if (std::ranges::none_of(views, linear)) return;
-    for (ReferenceView& view : views) {
-        const Rgba8Image* coded = view.texture.rgba8();
-        if (!coded) continue;
-        RgbaFloatImage floats(coded->width(), coded->height());
-        std::ranges::transform(coded->pixels(), floats.pixels().begin(), [](glm::u8vec4 c) {
-            return glm::vec4(linearFromSrgb8(c.r), linearFromSrgb8(c.g), linearFromSrgb8(c.b),
-                             static_cast<float>(c.a) / 255.0f);
-        });
-        view.texture = std::move(floats);
-    }
-}
-
-/// The views of a described frame. `failing` becomes the number of the view that cannot be read,
-/// where it is that.
-Result<Bundle> readViews(SetDescription set, const std::string& where,
-                         const ImageSetOptions& options, Job& job,
-                         std::optional<std::size_t>* failing = nullptr) {
-    useOrigin(set);
-    if (set.views.empty())
-        return failAt(where, ErrorCode::invalidInput,
-                      "it has no view; at least one with a picture and a depth image is expected");
-    STX_CHECK(dropMissing(set, options.strict, job));
-    STX_CHECK(checkFilesAreThere(set));
-    STX_CHECK(checkViewCount(set.views.size(), job.limits, where));
-    std::uint64_t pixels = 0;
-    for (const SetView& view : set.views)
-        pixels += static_cast<std::uint64_t>(view.camera.width) * view.camera.height;
-    STX_CHECK(within(
-        where, job.limits.checkAllocation(
-                   pixels, sizeof(float) + sizeof(glm::u8vec4),
-                   fmt::format("{} views (take each N-th with --every N)", set.views.size()))));
-
-    const auto count = static_cast<std::int64_t>(set.views.size());
-    std::vector<Result<std::vector<ReferenceView>>> loaded(set.views.size());
-    // Notes and reports in the order of the views, whichever is ready first.
-    std::vector<RefineReport> reports(set.views.size());
-    std::vector<Job> jobs(set.views.size());
-    for (Job& own : jobs) own.workFor(job);
-    std::atomic<std::int64_t> done = 0;
-    std::atomic<bool> failed = false;
-    parallelFor(0, count, [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
-        if (failed) return;
-        Job& own = jobs[at];
-        try {
-            loaded[at] = loadSetView(set.views[at], options, reports[at], own);
-        } catch (const std::bad_alloc&) {
-            loaded[at] = fail(ErrorCode::failed, "view '{}': there is not enough memory",
-                              set.views[at].name);
-        }
-        if (!loaded[at]) failed = true;
-        job.progress(++done, count, "reading views");
-    });
-    Bundle bundle;
-    bundle.title = std::move(set.title);
-    for (Job& own : jobs) own.passNotesOn();
-    for (std::size_t i = 0; i < loaded.size(); ++i) {
-        auto& views = loaded[i];
-        if (!views && failing) *failing = i;
-        if (!views) return tl::unexpected(views.error().at(where));
-        for (ReferenceView& view : *views) {
-            if (set.views[i].absent) makeUnknown(view);
-            bundle.views.push_back(std::move(view));
-        }
-    }
-    makeNamesUnique(bundle.views);
-    makeAllLinear(bundle.views);
-    if (!set.environment.empty()) {
-        STX_TRY(bundle.environment, readEnvironmentExr(set.environment, job));
-    }
-    findOrigin(bundle, set, job);
-    RefineReport report;
-    for (const RefineReport& ofView : reports) report.add(ofView);
-    STX_CHECK(attendToPoses(bundle, options, report, job));
-    if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));
-    if (set.photo && options.photo.behindPercent > 0) {
-        const BehindSettings settings{options.photo.behindPercent};
-        STX_TRY(const AddedBehind added, within(where, addBehind(bundle, settings, job)));
-        job.note(added.note(settings) + "; --behind none leaves it out");
-    }
-    if (options.refined) options.refined(report);
-    return bundle;
 }
 
 /// Each N-th view of a set, or each N-th moment of one that moves.
@@ -445,6 +263,10 @@ class StillSet : public Sequence {
                           index);
         return readViews(set_, where_, options_, job);
     }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        if (index > 0) return Sequence::views(index, job);
+        return tableOfViews(set_, where_, options_, heldOfSets(job.limits), job);
+    }
 
   private:
     std::string where_;
@@ -454,6 +276,11 @@ class StillSet : public Sequence {
 
 }  // namespace
 
+std::uint64_t heldOfSets(const Limits& limits) {
+    constexpr std::uint64_t kMost = 64u << 20, kPartOfLimit = 8;
+    return std::min(kMost, limits.maxMemoryBytes / kPartOfLimit);
+}
+
 Result<SetDescription> imagesets::describeSet(const path& path, const ImageSetOptions& options,
                                               Job& job) {
     STX_TRY(SetDescription set, describeFiles(path, options, job));
@@ -461,29 +288,67 @@ Result<SetDescription> imagesets::describeSet(const path& path, const ImageSetOp
     return set;
 }
 
-Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOptions& options,
-                            Job& job) {
+namespace {
+
+/// What a set that is read says, and how it moves.
+struct Described {
+    SetDescription set;
+    Motion motion;
+};
+
+/// Errors where the frame that is asked for is not in it.
+Result<Described> describeToRead(const std::filesystem::path& path, const ImageSetOptions& options,
+                                 Job& job) {
     STX_CHECK(checkOptions(options));
-    STX_TRY(SetDescription set, describeSet(path, options, job));
+    Described out;
+    STX_TRY(out.set, describeSet(path, options, job));
     const std::string where = inQuotes(path.string());
-    STX_TRY(Motion motion, motionToRead(set, options, where, job));
+    STX_TRY(out.motion, motionToRead(out.set, options, where, job));
     // What is not there says more than a number that is too large.
-    if (!motion.moves()) {
-        STX_CHECK(dropMissing(set, options.strict, job));
-        STX_CHECK(checkFilesAreThere(set));
+    if (!out.motion.moves()) {
+        STX_CHECK(dropMissing(out.set, options.strict, job));
+        STX_CHECK(checkFilesAreThere(out.set));
     }
-    const auto frames = motion.moves() ? static_cast<int>(motion.times.size()) : set.frames;
+    const auto frames =
+        out.motion.moves() ? static_cast<int>(out.motion.times.size()) : out.set.frames;
     if (options.frame >= frames)
         return failAt(where, ErrorCode::invalidInput,
                       "frame {} is asked for, but the set has {} (from 0)", options.frame, frames);
-    if (!motion.moves()) return readViews(std::move(set), where, options, job);
+    return out;
+}
+
+/// The moment of a set that moves that the options name.
+Result<Bundle> momentAsked(Described& described, const std::string& where,
+                           const ImageSetOptions& options, Job& job) {
+    Motion& motion = described.motion;
     if (options.frame == 0)
         job.note(fmt::format("the set moves: {} frames over {:.4g} s; this is the first",
                              motion.times.size(), motion.timeline().duration()));
-    STX_TRY(auto bundle,
-            momentOf(set, motion, static_cast<std::size_t>(options.frame), where, options, job));
-    bundle.time = motion.times[static_cast<std::size_t>(options.frame)];
+    const auto frame = static_cast<std::size_t>(options.frame);
+    STX_TRY(auto bundle, momentOf(described.set, motion, frame, where, options, job));
+    bundle.time = motion.times[frame];
     return bundle;
+}
+
+}  // namespace
+
+Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOptions& options,
+                            Job& job) {
+    const std::string where = inQuotes(path.string());
+    STX_TRY(auto described, describeToRead(path, options, job));
+    if (described.motion.moves()) return momentAsked(described, where, options, job);
+    return readViews(std::move(described.set), where, options, job);
+}
+
+Result<std::unique_ptr<ViewTable>> openSetViews(const std::filesystem::path& path,
+                                                const ImageSetOptions& options, Job& job,
+                                                std::uint64_t held) {
+    const std::string where = inQuotes(path.string());
+    STX_TRY(auto described, describeToRead(path, options, job));
+    if (!described.motion.moves())
+        return tableOfViews(std::move(described.set), where, options, held, job);
+    STX_TRY(auto bundle, momentAsked(described, where, options, job));
+    return tableOf(std::move(bundle));
 }
 
 Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path,

@@ -79,6 +79,36 @@ struct PointWriteOptions {
 [[nodiscard]] Result<void> writePoints(const std::filesystem::path& path, const PointCloud& points,
                                        Job& job, const PointWriteOptions& options = {});
 
+/// What all points of a .ply have, and how many there are.
+struct PlyContents {
+    std::size_t count = 0;
+    bool normals = false, colours = false, alpha = false;
+    glm::dvec3 origin{0.0};  ///< as PointCloud::origin
+};
+
+/// A .ply whose points come in parts: the bytes of writePoints(), in the memory of a part.
+class PlyInParts {
+  public:
+    /// Errors: invalidInput (no points, or more than a file can hold), io.
+    [[nodiscard]] static Result<PlyInParts> create(const std::filesystem::path& path,
+                                                   const PlyContents& contents,
+                                                   OutputFile::Options options);
+    /// The bytes of some points, whose arrays are those that the contents name. Safe from several
+    /// threads. Errors: (invalidInput) arrays of unlike length, values that are not finite.
+    [[nodiscard]] Result<Bytes> encode(const PointCloud& part) const;
+    /// Appends what encode() gave.
+    [[nodiscard]] Result<void> add(const Bytes& part);
+    /// Errors (invalidInput): there are more or fewer points than was said.
+    [[nodiscard]] Result<void> commit();
+
+  private:
+    PlyInParts(OutputFile file, const PlyContents& contents)
+        : file_(std::move(file)), contents_(contents) {}
+    OutputFile file_;
+    PlyContents contents_;
+    std::size_t bytes_ = 0;  ///< that were added
+};
+
 /// Writes a cloud of splats, whole or not at all, by the ending of `path`: .ply (INRIA's binary
 /// PLY, turned by half around X where up is +Y in the cloud, since up is -Y in such files), .spz
 /// (Niantic's version 3) or .glb (KHR_gaussian_splatting, with COLOR_0 for viewers that know only

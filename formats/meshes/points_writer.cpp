@@ -10,12 +10,16 @@
 namespace stx {
 namespace {
 
-Result<void> check(const PointCloud& points) {
-    const auto n = points.positions.size();
+Result<void> checkCount(std::size_t n) {
     if (n == 0) return fail(ErrorCode::invalidInput, "there are no points to write");
     if (n > 0x7fffffff)
         return fail(ErrorCode::invalidInput,
                     "{} points are more than a point file can hold (2^31 - 1)", n);
+    return {};
+}
+
+Result<void> checkValues(const PointCloud& points) {
+    const auto n = points.positions.size();
     if ((!points.colours.empty() && points.colours.size() != n) ||
         (!points.normals.empty() && points.normals.size() != n))
         return fail(ErrorCode::invalidInput,
@@ -32,37 +36,49 @@ Result<void> check(const PointCloud& points) {
     return {};
 }
 
-Bytes encodePly(const PointCloud& points) {
-    const bool hasNormals = !points.normals.empty(), hasColours = !points.colours.empty();
-    const bool large = points.origin != glm::dvec3(0.0);
-    const char* type = large ? "double" : "float";
+/// How the points of a .ply lie in it.
+struct PlyRow {
+    bool large;  ///< positions are doubles
+    std::size_t positionBytes, normalBytes, colourBytes;
+
+    explicit PlyRow(const PlyContents& c)
+        : large(c.origin != glm::dvec3(0.0)),
+          positionBytes(large ? 24 : 12),
+          normalBytes(c.normals ? 12 : 0),
+          colourBytes(!c.colours ? 0
+                      : c.alpha  ? 4
+                                 : 3) {}
+    [[nodiscard]] std::size_t bytes() const { return positionBytes + normalBytes + colourBytes; }
+};
+
+std::string plyHeader(const PlyContents& contents) {
+    const char* type = PlyRow(contents).large ? "double" : "float";
     std::string header = fmt::format(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\n"
         "property {} x\nproperty {} y\nproperty {} z\n",
-        points.positions.size(), type, type, type);
-    if (hasNormals) header += "property float nx\nproperty float ny\nproperty float nz\n";
-    if (hasColours) header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-    if (hasColours && points.alpha) header += "property uchar alpha\n";
-    header += "end_header\n";
-    const std::size_t colourBytes = !hasColours ? 0 : points.alpha ? 4 : 3;
-    const std::size_t positionBytes = large ? 24 : 12;
-    const std::size_t each = positionBytes + (hasNormals ? 12 : 0) + colourBytes;
-    Bytes bytes(header.size() + each * points.positions.size());
-    std::memcpy(bytes.data(), header.data(), header.size());
-    auto* at = bytes.data() + header.size();
+        contents.count, type, type, type);
+    if (contents.normals) header += "property float nx\nproperty float ny\nproperty float nz\n";
+    if (contents.colours)
+        header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    if (contents.colours && contents.alpha) header += "property uchar alpha\n";
+    return header + "end_header\n";
+}
+
+Bytes plyRows(const PointCloud& points, const PlyContents& contents) {
+    const PlyRow row(contents);
+    Bytes bytes(row.bytes() * points.positions.size());
+    auto* at = bytes.data();
     for (std::size_t i = 0; i < points.positions.size(); ++i) {
-        const glm::dvec3 world = glm::dvec3(points.positions[i]) + points.origin;
-        if (large)
-            std::memcpy(at, &world, positionBytes);
+        const glm::dvec3 world = glm::dvec3(points.positions[i]) + contents.origin;
+        if (row.large)
+            std::memcpy(at, &world, row.positionBytes);
         else
-            std::memcpy(at, &points.positions[i], positionBytes);
-        at += positionBytes;
-        if (hasNormals) {
-            std::memcpy(at, &points.normals[i], 12);
-            at += 12;
-        }
-        if (hasColours) std::memcpy(at, &points.colours[i], colourBytes);
-        at += colourBytes;
+            std::memcpy(at, &points.positions[i], row.positionBytes);
+        at += row.positionBytes;
+        if (contents.normals) std::memcpy(at, &points.normals[i], row.normalBytes);
+        at += row.normalBytes;
+        if (contents.colours) std::memcpy(at, &points.colours[i], row.colourBytes);
+        at += row.colourBytes;
     }
     return bytes;
 }
@@ -135,12 +151,52 @@ Result<Bytes> encodeDraco(const PointCloud& points, Job& job, const PointWriteOp
 
 }  // namespace
 
+Result<PlyInParts> PlyInParts::create(const std::filesystem::path& path,
+                                      const PlyContents& contents, OutputFile::Options options) {
+    STX_CHECK(checkCount(contents.count));
+    STX_TRY(auto file, OutputFile::create(path, options));
+    STX_CHECK(file.write(plyHeader(contents)));
+    return PlyInParts(std::move(file), contents);
+}
+
+Result<Bytes> PlyInParts::encode(const PointCloud& part) const {
+    STX_CHECK(checkValues(part));
+    if (!part.positions.empty() &&
+        (part.normals.empty() == contents_.normals || part.colours.empty() == contents_.colours))
+        return fail(ErrorCode::invalidInput,
+                    "some points have normals or colours and others do not; all must be alike");
+    return plyRows(part, contents_);
+}
+
+Result<void> PlyInParts::add(const Bytes& part) {
+    bytes_ += part.size();
+    return file_.write(ByteSpan(part));
+}
+
+Result<void> PlyInParts::commit() {
+    const std::size_t found = bytes_ / PlyRow(contents_).bytes();
+    if (found != contents_.count)
+        return fail(ErrorCode::invalidInput, "there are {} points, but {} were said to come", found,
+                    contents_.count);
+    return file_.commit();
+}
+
 Result<void> writePoints(const std::filesystem::path& path, const PointCloud& points, Job& job,
                          const PointWriteOptions& options) {
-    STX_CHECK(check(points));
+    STX_CHECK(checkCount(points.positions.size()));
+    STX_CHECK(checkValues(points));
     auto ending = path.extension().string();
     for (auto& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    if (ending == ".ply") return writeFile(path, encodePly(points), options.file);
+    if (ending == ".ply") {
+        STX_TRY(auto file,
+                PlyInParts::create(path,
+                                   {points.positions.size(), !points.normals.empty(),
+                                    !points.colours.empty(), points.alpha, points.origin},
+                                   options.file));
+        STX_TRY(const auto rows, file.encode(points));
+        STX_CHECK(file.add(rows));
+        return file.commit();
+    }
     if (ending != ".drc")
         return fail(ErrorCode::usage, "points are written as .ply or .drc, not as '{}'",
                     path.filename().string());

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "formats/validate/validate.hpp"
+#include "lib/model/view_table.hpp"
 
 /// What the parts of the validator share.
 namespace stx {
@@ -40,5 +41,8 @@ void checkVectors(const ReferenceView& view, const std::string& where, Findings&
 [[nodiscard]] Result<std::vector<Finding>> validateAtlasFile(const std::filesystem::path& path,
                                                              const ValidateOptions& options,
                                                              Job& job);
+
+/// validate() of a bundle whose views are read one by one. Errors: those of reading them.
+[[nodiscard]] Result<std::vector<Finding>> validateViews(const ViewTable& table, Job& job);
 
 }  // namespace stx

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 
@@ -107,16 +108,46 @@ std::int64_t checkViewImages(const ReferenceView& view, const std::string& where
     return points;
 }
 
+namespace {
+
+/// What the views break, one after the other; `points`: of each.
+std::vector<Finding> ofAllViews(const std::vector<Findings>& views,
+                                const std::vector<std::int64_t>& points) {
+    Findings all;
+    for (const Findings& found : views)
+        all.list.insert(all.list.end(), found.list.begin(), found.list.end());
+    if (std::ranges::all_of(points, [](std::int64_t n) { return n == 0; }))
+        all.add(4007, "", "no point in any view", "points");
+    return all.list;
+}
+
+/// Gives its count of points.
+std::int64_t checkWholeView(const ReferenceView& view, std::size_t index, Findings& findings) {
+    const std::string where = viewText(index, view.name);
+    checkViewHeader(view, where, findings);
+    return checkViewImages(view, where, findings);
+}
+
+}  // namespace
+
 std::vector<Finding> validate(const Bundle& bundle) {
-    Findings findings;
-    std::int64_t points = 0;
-    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
-        const std::string where = viewText(i, bundle.views[i].name);
-        checkViewHeader(bundle.views[i], where, findings);
-        points += checkViewImages(bundle.views[i], where, findings);
-    }
-    if (points == 0) findings.add(4007, "", "no point in any view", "points");
-    return findings.list;
+    std::vector<Findings> found(bundle.views.size());
+    std::vector<std::int64_t> points(bundle.views.size());
+    for (std::size_t i = 0; i < bundle.views.size(); ++i)
+        points[i] = checkWholeView(bundle.views[i], i, found[i]);
+    return ofAllViews(found, points);
+}
+
+Result<std::vector<Finding>> validateViews(const ViewTable& table, Job& job) {
+    std::vector<Findings> found(table.count());
+    std::vector<std::int64_t> points(table.count());
+    const auto look = [&](std::size_t i,
+                          std::shared_ptr<const ReferenceView> view) -> Result<void> {
+        points[i] = checkWholeView(*view, i, found[i]);
+        return {};
+    };
+    STX_CHECK(forEachView(table, {"validating", 0}, job, look));
+    return ofAllViews(found, points);
 }
 
 }  // namespace stx

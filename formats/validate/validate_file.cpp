@@ -1,6 +1,7 @@
 #include "formats/any/open.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/imagesets/image_sets.hpp"
+#include "formats/imagesets/set_views.hpp"
 #include "formats/imagesets/summary.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/validate/findings.hpp"
@@ -20,11 +21,14 @@ Result<std::vector<Finding>> validateImageSet(const std::filesystem::path& path,
             findings.add(1003, viewText(i, set->views[i].name), fmt::format("no file '{}'", name),
                          "the file");
     if (!findings.list.empty() || !options.pixels) return findings.list;
-    const auto bundle = readImageSet(path, {}, job);
-    if (bundle) return validate(*bundle);
+    const auto views = [&]() -> Result<std::vector<Finding>> {
+        STX_TRY(const auto table, openSetViews(path, {}, job, heldOfSets(job.limits)));
+        return validateViews(*table, job);
+    }();
+    if (views) return views;
     // Without --depth-range and the like the set is not wrong, but cannot be read.
-    if (bundle.error().code == ErrorCode::usage) return tl::unexpected(bundle.error());
-    Error error = bundle.error();
+    if (views.error().code == ErrorCode::usage) return views;
+    Error error = views.error();
     if (error.code == ErrorCode::io) error.code = ErrorCode::invalidInput;
     return unreadable(error);
 }

@@ -21,7 +21,11 @@ struct PeakMemory {
 /// 60 MiB that the program takes for nothing (a driver in software: 270 MiB; tests/cli/peak_test.py
 /// --measure 1).
 namespace peak {
-inline constexpr PeakMemory kAtlas = {"an atlas", 36};
+// Of views in memory: pages that are as large, and what is below.
+inline constexpr PeakMemory kAtlas = {"an atlas", 24};
+// Of pages beside themselves, while they are written: pictures that are coded.
+inline constexpr PeakMemory kAtlasPages = {"an atlas", 16};
+inline constexpr PeakMemory kAtlasPagesVectors = {"an atlas", 40};
 inline constexpr PeakMemory kBake = {"baking", 36, 24};  // the vectors that it adds
 inline constexpr PeakMemory kBakeToMpeg4 = {"baking into MPEG-4", 76};
 inline constexpr PeakMemory kBackground = {"a background", 32};

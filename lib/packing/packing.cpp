@@ -20,6 +20,11 @@ struct Contents {
         return (linear ? 16 : 4) + 4 + (normals ? 12 : 0) + (splats ? 24 : 0) +
                (metallicRoughness ? 8 : 0) + (emissive ? 12 : 0);
     }
+    /// What a page takes while it is written, bytes a pixel beside itself.
+    [[nodiscard]] std::uint64_t toWrite() const {
+        const bool more = normals || splats || metallicRoughness || emissive;
+        return (more ? peak::kAtlasPagesVectors : peak::kAtlasPages).perPixel;
+    }
 };
 
 Contents contentsOf(const std::vector<ViewImageKinds>& views) {
@@ -234,7 +239,23 @@ Atlas emptyAtlas(const ViewTable& table, const AtlasLayout& layout, const Conten
     return atlas;
 }
 
+std::uint64_t pixelsOf(const AtlasLayout& layout) {
+    return static_cast<std::uint64_t>(layout.width) * static_cast<std::uint64_t>(layout.height) *
+           static_cast<std::uint64_t>(layout.pages);
+}
+
 }  // namespace
+
+Result<std::uint64_t> memoryOfGrid(const ViewTable& table, const PackSettings& settings) {
+    const Contents contents = contentsOf(table.kinds());
+    STX_TRY(const AtlasLayout layout,
+            gridLayout(table.about(), settings, 4 / contents.texturesPerPage()));
+    // Views come before the pages are written.
+    const std::uint64_t pixels = pixelsOf(layout);
+    return pixels * contents.bytesPerPixel() +
+           std::max(memoryOfEach(table, {"an atlas", 0}),
+                    table.bytesHeld() + pixels * contents.toWrite());
+}
 
 Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& job) {
     STX_CHECK(checkSettings(table, settings));
@@ -243,10 +264,10 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
     STX_TRY(AtlasLayout layout, layoutOf(table, settings, 4 / contents.texturesPerPage(), job));
     if (layout.rectangles.empty())
         return fail(ErrorCode::invalidInput, "none of the {} views has a point to pack", count);
-    // The pages, a page while its picture is packed, and views that are in memory.
+    // With views that are in memory.
     STX_CHECK(job.limits.checkAllocation(
-        static_cast<std::uint64_t>(layout.width) * layout.height * layout.pages,
-        (table.whole() ? 2 : 1) * contents.bytesPerPixel() + 24, "an atlas"));
+        pixelsOf(layout), (table.whole() ? 2 : 1) * contents.bytesPerPixel() + contents.toWrite(),
+        "an atlas"));
     Atlas atlas = emptyAtlas(table, layout, contents, settings);
     const bool tight = settings.layout == PackSettings::Layout::tight;
     const std::vector<int> source = keptViews(table.about(), tight, layout.rectangles, job);

@@ -29,4 +29,9 @@ struct Pruning {
 [[nodiscard]] std::unique_ptr<ViewTable> prunedViews(std::unique_ptr<ViewTable> table,
                                                      Pruning pruning);
 
+/// Memory that packing whole views (Layout::grid) and writing the atlas take at their peak, what
+/// the table holds included, bytes. Looks at no pixel. Errors: views that cannot fit.
+[[nodiscard]] Result<std::uint64_t> memoryOfGrid(const ViewTable& table,
+                                                 const PackSettings& settings);
+
 }  // namespace stx

@@ -15,8 +15,7 @@ namespace stx {
 namespace registration {
 namespace {
 
-/// Points looked up per view and axis to measure a pair, and the fewest that tell.
-constexpr int kMeasured = 80;
+/// The fewest points of a pair that tell.
 constexpr std::size_t kFewestPoints = 30;
 /// What counts as one surface when views are drawn, a share of the distance (kSame of
 /// shaders/shared/surface_constants.glsl, kSameDepth of lib/render/splat), or of a pixel's width if
@@ -25,33 +24,11 @@ constexpr std::size_t kFewestPoints = 30;
 /// overlap.
 constexpr double kSameShare = 0.002, kSameOfPixel = 0.25;
 
-/// What a pair disagrees by.
-struct OfPair {
-    bool told = false;
-    double relative = 0, oneSurface = 0;  ///< as in ViewDisagreement
-};
-
 /// A pixel's width and half a step of the depth code, shares of the distance.
 glm::dvec2 finenessOf(const ViewHeader& view, double dist) {
     const glm::dvec2 spacing = view.camera.sampleSpacing(dist);
     const double step = view.depthBits < 32 ? view.depthCode().step() : 0.0;
     return glm::dvec2(std::max(spacing.x, spacing.y), step / 2) / dist;
-}
-
-OfPair measured(const DepthView& from, const DepthView& to, double tolerance) {
-    const CommonPoints common = commonPoints(from, to, kMeasured, tolerance);
-    if (common.points.size() < kFewestPoints) return {};
-    std::vector<double> apart, own, there;
-    for (const CommonPoints::CommonPoint& p : common.points) {
-        apart.push_back(std::abs(p.at - p.shown) / p.at);
-        own.push_back(p.own);
-        there.push_back(p.at);
-    }
-    const auto quarter = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 4);
-    std::nth_element(apart.begin(), quarter, apart.end());
-    const glm::dvec2 a = finenessOf(*from.header, medianOf(std::move(own))),
-                     b = finenessOf(*to.header, medianOf(std::move(there)));
-    return {true, *quarter, std::max(kSameShare, kSameOfPixel * std::max(a.x, b.x)) + a.y + b.y};
 }
 
 /// Of the view with that index.
@@ -84,15 +61,38 @@ ViewDisagreement ofView(int view, const std::vector<Pair>& pairs,
 
 }  // namespace
 
+OfPair measurePair(const GridOfPoints& from, const ViewHeader& own, const DepthView& to,
+                   double tolerance) {
+    const CommonPoints common = commonPoints(from, own.camera, to, tolerance);
+    if (common.points.size() < kFewestPoints) return {};
+    std::vector<double> apart, near, there;
+    for (const CommonPoints::CommonPoint& p : common.points) {
+        apart.push_back(std::abs(p.at - p.shown) / p.at);
+        near.push_back(p.own);
+        there.push_back(p.at);
+    }
+    const auto quarter = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 4);
+    std::nth_element(apart.begin(), quarter, apart.end());
+    const glm::dvec2 a = finenessOf(own, medianOf(std::move(near))),
+                     b = finenessOf(*to.header, medianOf(std::move(there)));
+    return {true, *quarter, std::max(kSameShare, kSameOfPixel * std::max(a.x, b.x)) + a.y + b.y};
+}
+
 DepthDisagreement disagreement(std::span<const DepthView> views, const std::vector<Pair>& pairs,
                                const OverlapSettings& settings) {
     std::vector<OfPair> found(pairs.size());
     parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
         const Pair& pair = pairs[static_cast<std::size_t>(i)];
+        const DepthView& from = views[static_cast<std::size_t>(pair.from)];
         found[static_cast<std::size_t>(i)] =
-            measured(views[static_cast<std::size_t>(pair.from)],
-                     views[static_cast<std::size_t>(pair.to)], settings.overlapTolerance);
+            measurePair(gridOfPoints(*from.depth, kMeasured), *from.header,
+                        views[static_cast<std::size_t>(pair.to)], settings.overlapTolerance);
     });
+    return togetherOf(pairs, found, views.size());
+}
+
+DepthDisagreement togetherOf(const std::vector<Pair>& pairs, const std::vector<OfPair>& found,
+                             std::size_t views) {
     DepthDisagreement result;
     std::vector<double> values;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -103,7 +103,7 @@ DepthDisagreement disagreement(std::span<const DepthView> views, const std::vect
     result.pairs = static_cast<int>(values.size());
     if (result.pairs > 0) result.overlap /= result.pairs;
     result.relative = medianOf(std::move(values));
-    for (std::size_t v = 0; v < views.size(); ++v)
+    for (std::size_t v = 0; v < views; ++v)
         result.views.push_back(ofView(static_cast<int>(v), pairs, found));
     return result;
 }

@@ -13,7 +13,7 @@ constexpr float kEdge = 0.05f;
 /// Points looked up per view and axis to find who overlaps: in few views, in many (each is held
 /// against each).
 constexpr int kProbes = 24, kProbesOfMany = 10;
-constexpr int kMany = 64;
+constexpr std::size_t kMany = 64;
 
 /// Where a camera is, for another one: a place there, w being 1, or the direction towards an
 /// orthographic one, w being 0.
@@ -23,17 +23,17 @@ glm::dvec4 eyeIn(const Pose& frame, const Camera& camera) {
 }
 
 /// Whether two eyes, in the space of a view's camera, look at the same side of the surface that
-/// passes pixel (x, y) of it.
-bool seeTheSameSide(const DepthView& view, int x, int y, const glm::dvec4& own,
+/// passes a point of it.
+bool seeTheSameSide(const Camera& camera, const GridOfPoints::Point& p, const glm::dvec4& own,
                     const glm::dvec4& other) {
-    const auto here = sampleDepth(*view.depth, x + 0.5, y + 0.5);
-    if (!here) return false;
+    if (!p.onSurface) return false;
+    const double dist = p.own;
     const auto at = [&](double dx, double dy, double more) {
-        return view.header->camera.unproject(x + 0.5 + dx, y + 0.5 + dy, here->distance + more);
+        return camera.unproject(p.x + 0.5 + dx, p.y + 0.5 + dy, dist + more);
     };
     const glm::dvec3 point = at(0, 0, 0);
-    const glm::dvec3 normal =
-        glm::cross(at(1, 0, here->gradient.x) - point, at(0, 1, here->gradient.y) - point);
+    const glm::dvec3 normal = glm::cross(at(1, 0, p.right - p.own) - point,
+                                         at(0, 1, static_cast<double>(p.below) - dist) - point);
     const auto side = [&](const glm::dvec4& eye) {
         return glm::dot(normal, glm::dvec3(eye) - eye.w * point);
     };
@@ -42,27 +42,39 @@ bool seeTheSameSide(const DepthView& view, int x, int y, const glm::dvec4& own,
 
 }  // namespace
 
-CommonPoints commonPoints(const DepthView& from, const DepthView& to, int perAxis,
+GridOfPoints gridOfPoints(const Image<float>& depth, int perAxis) {
+    GridOfPoints grid;
+    const int stepX = std::max(1, depth.width() / perAxis);
+    const int stepY = std::max(1, depth.height() / perAxis);
+    for (int y = stepY / 2; y < depth.height(); y += stepY) {
+        for (int x = stepX / 2; x < depth.width(); x += stepX) {
+            const float dist = depth.at(x, y);
+            if (!hasPoint(dist)) continue;
+            const bool surface = sampleDepth(depth, x + 0.5, y + 0.5).has_value();
+            grid.points.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
+                                   dist, surface ? depth.at(x + 1, y) : 0.0f,
+                                   surface ? depth.at(x, y + 1) : 0.0f, surface});
+        }
+    }
+    return grid;
+}
+
+CommonPoints commonPoints(const GridOfPoints& from, const Camera& own, const DepthView& to,
                           double tolerance) {
     CommonPoints out;
-    const Camera &own = from.header->camera, &other = to.header->camera;
+    const Camera& other = to.header->camera;
     const Pose source(own), target(other);
     const glm::dvec4 ownEye = eyeIn(source, own), otherEye = eyeIn(source, other);
-    const int stepX = std::max(1, own.width / perAxis), stepY = std::max(1, own.height / perAxis);
-    for (int y = stepY / 2; y < own.height; y += stepY) {
-        for (int x = stepX / 2; x < own.width; x += stepX) {
-            const float dist = from.depth->at(x, y);
-            if (!hasPoint(dist)) continue;
-            ++out.asked;
-            const glm::dvec3 inTarget = target.toCamera(
-                source.position + source.worldFromCamera * own.unproject(x + 0.5, y + 0.5, dist));
-            if (!(inTarget.z < 0)) continue;
-            const glm::dvec3 at = other.project(inTarget);
-            const auto there = sampleDepth(*to.depth, at.x, at.y);
-            if (!there || !(std::abs(at.z - there->distance) < tolerance * at.z)) continue;
-            if (!seeTheSameSide(from, x, y, ownEye, otherEye)) continue;
-            out.points.push_back({dist, at.z, there->distance});
-        }
+    out.asked = static_cast<int>(from.points.size());
+    for (const GridOfPoints::Point& p : from.points) {
+        const glm::dvec3 inTarget = target.toCamera(
+            source.position + source.worldFromCamera * own.unproject(p.x + 0.5, p.y + 0.5, p.own));
+        if (!(inTarget.z < 0)) continue;
+        const glm::dvec3 at = other.project(inTarget);
+        const auto there = sampleDepth(*to.depth, at.x, at.y);
+        if (!there || !(std::abs(at.z - there->distance) < tolerance * at.z)) continue;
+        if (!seeTheSameSide(own, p, ownEye, otherEye)) continue;
+        out.points.push_back({p.own, at.z, there->distance});
     }
     return out;
 }
@@ -82,6 +94,10 @@ std::optional<DepthSample> sampleDepth(const Image<float>& depth, double x, doub
                        {(b - a) * (1 - v) + (d - c) * v, lower - upper}};
 }
 
+int probesAmong(std::size_t views) {
+    return views < kMany ? kProbes : kProbesOfMany;
+}
+
 std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
                                    const OverlapSettings& settings) {
     const int count = static_cast<int>(views.size());
@@ -89,13 +105,13 @@ std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
     parallelFor(0, count, [&](std::int64_t i) {
         const DepthView& from = views[static_cast<std::size_t>(i)];
         auto& pairs = ofView[static_cast<std::size_t>(i)];
+        const GridOfPoints grid = gridOfPoints(*from.depth, probesAmong(views.size()));
         for (int j = 0; j < count; ++j) {
             if (j == i) continue;
             const DepthView& to = views[static_cast<std::size_t>(j)];
             if (to.header->background != from.header->background) continue;
-            const double overlap = commonPoints(from, to, count < kMany ? kProbes : kProbesOfMany,
-                                                settings.overlapTolerance)
-                                       .overlap();
+            const double overlap =
+                commonPoints(grid, from.header->camera, to, settings.overlapTolerance).overlap();
             if (overlap >= settings.minOverlap) pairs.push_back({static_cast<int>(i), j, overlap});
         }
         std::stable_sort(pairs.begin(), pairs.end(),

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -24,6 +25,20 @@ struct DepthSample {
 };
 [[nodiscard]] std::optional<DepthSample> sampleDepth(const Image<float>& depth, double x, double y);
 
+/// What a view shows on a grid of its pixels: all that is looked at of it to find out what another
+/// one sees of the same.
+struct GridOfPoints {
+    struct Point {
+        std::uint16_t x, y;  ///< its pixel
+        float own;           ///< distance
+        float right, below;  ///< of the pixels beside it, where they are on one surface
+        bool onSurface;      ///< they are
+    };
+    std::vector<Point> points;  ///< pixels of the grid that have one, row by row
+};
+/// `perAxis`: about so many pixels along either side.
+[[nodiscard]] GridOfPoints gridOfPoints(const Image<float>& depth, int perAxis);
+
 /// What two views both show, on a grid of pixels of the first.
 struct CommonPoints {
     struct CommonPoint {
@@ -38,10 +53,10 @@ struct CommonPoints {
         return asked > 0 ? static_cast<double>(points.size()) / asked : 0;
     }
 };
-/// `perAxis`: about so many pixels of `from` along either side. Points that are apart by a larger
-/// share than `tolerance`, or that are seen from the other side, are not the same.
-[[nodiscard]] CommonPoints commonPoints(const DepthView& from, const DepthView& to, int perAxis,
-                                        double tolerance);
+/// Points of the grid of a view with that camera that are apart by a larger share than `tolerance`,
+/// or that are seen from the other side, are not the same.
+[[nodiscard]] CommonPoints commonPoints(const GridOfPoints& from, const Camera& own,
+                                        const DepthView& to, double tolerance);
 
 /// A view's camera, ready to be applied to many points.
 struct Pose {
@@ -53,6 +68,23 @@ struct Pose {
         return (world - position) * worldFromCamera;
     }
 };
+
+/// Points a side by which it is found who overlaps, among so many views.
+[[nodiscard]] int probesAmong(std::size_t views);
+/// Points a side by which a pair is measured.
+inline constexpr int kMeasured = 80;
+
+/// What a pair disagrees by.
+struct OfPair {
+    bool told = false;
+    double relative = 0, oneSurface = 0;  ///< as in ViewDisagreement
+};
+/// `from`: the grid of kMeasured of a view with that header.
+[[nodiscard]] OfPair measurePair(const GridOfPoints& from, const ViewHeader& own,
+                                 const DepthView& to, double tolerance);
+/// Of pairs in the order of overlappingPairs(), and as many views.
+[[nodiscard]] DepthDisagreement togetherOf(const std::vector<Pair>& pairs,
+                                           const std::vector<OfPair>& found, std::size_t views);
 
 /// Pairs of overlapping views, both directions, in order of `from`, the widest overlaps first.
 [[nodiscard]] std::vector<Pair> overlappingPairs(std::span<const DepthView> views,

@@ -90,7 +90,7 @@ MOST = 1.15
 
 
 def of_many():
-    """Commands that hold one view for each thread. {} is a bundle, VIEWS the words for views of a model."""
+    """Commands that hold one view for each thread. {} is a bundle, VIEWS the words for views of a model, SET an image set."""
     yield "model to exr", "convert MODEL -o OUT.exr VIEWS"
     yield "model to mp4", "convert MODEL -o OUT.mp4 VIEWS"
     yield "exr to exr", "convert {}.exr -o OUT.exr"
@@ -101,7 +101,14 @@ def of_many():
         yield f"bake {kind}", f"bake {{}}.{kind} -o OUT.{kind}"
         yield f"extract {kind}", f"extract {{}}.{kind} -o OUT"
         yield f"sheet {kind}", f"sheet {{}}.{kind} -o OUT.png"
+        yield f"points {kind}", f"extract {{}}.{kind} -o OUT.ply"
         yield f"validate {kind}", f"validate {{}}.{kind}"
+    yield "set to exr", "convert SET -o OUT.exr"
+    yield "set to mp4", "convert SET -o OUT.mp4"
+    yield "bake set", "bake SET -o OUT.exr"
+    yield "extract set", "extract SET -o OUT"
+    yield "sheet set", "sheet SET -o OUT.png"
+    yield "validate set", "validate SET"
     yield "extract png", "extract {}.exr -o OUT --depth png"
     yield "extract miv", "extract {}.exr -o OUT --cameras miv"
     yield "extract colmap", "extract {}.exr -o OUT --cameras colmap"
@@ -119,13 +126,16 @@ def many_views(args, folder):
     for count in counts:
         must([args.stx, "convert", model, "-o", f"many{count}.exr"] + views(count), folder)
         must([args.stx, "convert", f"many{count}.exr", "-o", f"many{count}.mp4"], folder)
+        # What a set takes in memory where it is small (heldOfSets()) is more than what 36 views take one by one.
+        must([args.stx, "extract", f"many{count}.exr", "-o", f"many{count}set"], folder)
     for number, (name, line) in enumerate(of_many()):
         if args.only not in "many " + name:
             continue
         peaks = []
         for count in counts:
             words = [part for word in line.split() for part in (views(count) if word == "VIEWS" else [word])]
-            words = [word.replace("OUT", f"many{count}_{number}").replace("{}", f"many{count}").replace("MODEL", model) for word in words]
+            words = [word.replace("OUT", f"many{count}_{number}").replace("{}", f"many{count}").replace("SET", f"many{count}set")
+                     .replace("MODEL", model) for word in words]
             # Threads of more processors would hold more of both.
             done = must([args.stx] + words + ["--threads", "2"], folder)
             peaks.append(done.usage.ru_maxrss / 1024)
@@ -176,12 +186,12 @@ def above_info(args, folder):
 def from_few(args, folder):
     """What is not the same, or takes too much, of pictures of 36 views that do not fit memory."""
     wrong = []
-    for kind in ("exr", "mp4") if os.path.exists(args.model) else ():
+    for kind in (".exr", ".mp4", "set") if os.path.exists(args.model) else ():
         for options in ("", "--quality best --light dir:0.5,-1.5,-1", "--mode splat"):
             name = f"few {kind} {options}"
             if args.only not in name:
                 continue
-            line = f"render many36.{kind} --orbit 3 --elevation 20 --size 512x512 --backend cpu --threads 2 {options}".split()
+            line = f"render many36{kind} --orbit 3 --elevation 20 --size 512x512 --backend cpu --threads 2 {options}".split()
             every = must([args.stx] + line + ["-o", "all_%d.png"], folder)
             few = must([args.stx] + line + ["-o", "few_%d.png", "--max-memory", str(FEW_LIMIT)], folder)
             pictures = [open(os.path.join(folder, f"{which}_{i}.png"), "rb").read() for which in ("all", "few") for i in range(3)]
@@ -215,6 +225,14 @@ def pruned_one_by_one(args, folder):
             print(f"{name:46} {peak:6.1f} MiB, {each:.1f} bytes a pixel", flush=True)
         elif each > PRUNE:
             wrong.append(f"{name}: {peak:.1f} MiB, {each:.1f} bytes a pixel")
+        if not options:
+            found = json.loads(must([args.stx, "info", "many36.exr", "--memory", "--threads", "2", "--format", "json"], folder).out)
+            said, = (row["bytes"] / (1 << 20) for row in found["memory"]["commands"] if row["command"] == "pack")
+            if args.measure:
+                print(f"{name:46} {said:6.1f} MiB by stx info --memory", flush=True)
+            # The pages are 24 bytes a pixel at most, of views in memory 32.
+            elif not peak - PROGRAM <= said <= 1.7 * peak:
+                wrong.append(f"{name}: {peak:.1f} MiB, but stx info --memory says {said:.1f}")
     return wrong
 
 

@@ -232,6 +232,37 @@ TEST_F(WritePoints, SameInputSameBytes) {
     }
 }
 
+TEST_F(WritePoints, PlyInPartsIsThePlyOfAll) {
+    Job job;
+    for (const glm::dvec3 origin : {glm::dvec3(0), glm::dvec3(4e6, 1, -2)}) {
+        PointCloud all = cloud();
+        all.origin = origin;
+        ASSERT_TRUE(writePoints(folder_ / "all.ply", all, job));
+        auto file = PlyInParts::create(folder_ / "parts.ply", {500, true, true, true, origin}, {});
+        ASSERT_TRUE(file) << file.error().text();
+        for (const auto& [first, count] : {std::pair(0, 199), {199, 0}, {199, 301}}) {
+            const PointCloud part = {all.positions.subspan(first, count),
+                                     all.colours.subspan(first, count),
+                                     all.normals.subspan(first, count), true, origin};
+            const auto rows = file->encode(part);
+            ASSERT_TRUE(rows) << rows.error().text();
+            ASSERT_TRUE(file->add(*rows));
+        }
+        ASSERT_TRUE(file->commit());
+        EXPECT_EQ(*readFile(folder_ / "all.ply", job.limits),
+                  *readFile(folder_ / "parts.ply", job.limits));
+    }
+    // Other points than were said leave no file.
+    auto file = PlyInParts::create(folder_ / "few.ply", {499, true, true, true, {}}, {});
+    ASSERT_TRUE(file);
+    ASSERT_TRUE(file->add(*file->encode(cloud())));
+    EXPECT_EQ(file->commit().error().code, ErrorCode::invalidInput);
+    PointCloud bare = cloud();
+    bare.normals = {};
+    EXPECT_EQ(file->encode(bare).error().code, ErrorCode::invalidInput);
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "few.ply"));
+}
+
 TEST_F(WritePoints, DebiansDecoderReadsIt) {
     if (std::system("command -v draco_decoder > /dev/null") != 0)
         GTEST_SKIP() << "no draco_decoder here";

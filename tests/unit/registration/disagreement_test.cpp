@@ -2,9 +2,13 @@
 
 #include "lib/registration/disagreement.hpp"
 
+#include <mutex>
+#include <tuple>
+
 #include <gtest/gtest.h>
 
 #include "lib/base/parallel.hpp"
+#include "lib/registration/disagreement_by_view.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
 
 namespace stx {
@@ -56,6 +60,49 @@ TEST(DepthDisagreement, IsTheOffsetThatAViewHas) {
     const auto aligned = disagreementNote(bundle, found, true);
     ASSERT_TRUE(aligned);
     EXPECT_EQ(aligned->find("--with poses"), std::string::npos) << *aligned;
+}
+
+// Views that are not kept give the same, in whichever order and on however many threads they come.
+TEST(DepthDisagreement, OfViewsOneByOneIsThatOfAllAtOnce) {
+    for (const AnalyticScene scene : {AnalyticScene::room, AnalyticScene::object}) {
+        Bundle bundle = exactViews(scene);
+        for (int i = 0; i < 7; ++i)
+            bundle.views.push_back(bundle.views[static_cast<std::size_t>(i) % kViews]);
+        for (std::size_t v = 0; v < bundle.views.size(); ++v)
+            for (float& depth : bundle.views[v].depth.pixels())
+                depth *= 1.0f + 0.003f * static_cast<float>(v * v % 5);
+        bundle.views[6].background = bundle.views[9].background = true;
+        OverlapSettings settings;
+        settings.neighbours = 3;
+        const DepthDisagreement whole = measureDepthDisagreement(bundle, settings);
+        ASSERT_GT(whole.pairs, 0);
+        DisagreementByView each(bundle.views.size(), settings);
+        for (std::size_t v = bundle.views.size(); v-- > 0;) each.sample(v, bundle.views[v].depth);
+        int last = 0;
+        const auto count = static_cast<std::int64_t>(bundle.views.size());
+        std::mutex mutex;
+        parallelFor(0, count, [&](std::int64_t i) {
+            const auto v = static_cast<std::size_t>(count - 1 - i);
+            const bool now = each.compare(v, bundle.views[v].depth, bundle);
+            const std::lock_guard lock(mutex);
+            last += now;
+        });
+        EXPECT_EQ(last, 1);
+        EXPECT_FALSE(each.compare(0, bundle.views[0].depth, bundle));
+        const DepthDisagreement found = each.result();
+        EXPECT_EQ(found.pairs, whole.pairs);
+        EXPECT_EQ(found.overlap, whole.overlap);
+        EXPECT_EQ(found.relative, whole.relative);
+        ASSERT_EQ(found.views.size(), whole.views.size());
+        for (std::size_t v = 0; v < found.views.size(); ++v) {
+            const ViewDisagreement &a = found.views[v], &b = whole.views[v];
+            EXPECT_EQ(
+                std::tie(a.partners, a.overlap, a.relative, a.oneSurface, a.farthest, a.farthestBy),
+                std::tie(b.partners, b.overlap, b.relative, b.oneSurface, b.farthest, b.farthestBy))
+                << v;
+        }
+        EXPECT_EQ(disagreementNote(bundle, found, false), disagreementNote(bundle, whole, false));
+    }
 }
 
 // The other two have one good partner each.

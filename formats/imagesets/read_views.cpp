@@ -1,0 +1,226 @@
+#include "formats/imagesets/read_views.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <set>
+
+#include "formats/exr/environment_exr.hpp"
+#include "formats/files/messages.hpp"
+#include "formats/imagesets/kinds.hpp"
+#include "lib/background/behind_photo.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/geometry/origin.hpp"
+#include "lib/model/srgb8.hpp"
+#include "lib/refine/poses.hpp"
+#include "lib/registration/disagreement.hpp"
+
+namespace stx::imagesets {
+namespace {
+
+/// Refines the poses where that is asked for, and says which views disagree.
+Result<void> attendToPoses(Bundle& bundle, const ImageSetOptions& options, RefineReport& report,
+                           Job& job) {
+    const bool refines = options.refine.atImport(RefineStep::poses, false);
+    if (refines) {
+        STX_TRY(report.of(RefineStep::poses), alignPoses(bundle, job));
+    }
+    if (const auto note = disagreementNote(bundle, measureDepthDisagreement(bundle), refines))
+        job.note(*note);
+    return {};
+}
+
+/// Cameras of an export of ours count from its origin, to the bit as they were.
+void useOrigin(SetDescription& set) {
+    if (!set.origin) return;
+    for (SetView& view : set.views) {
+        const glm::dvec3 local = view.camera.position - *set.origin;
+        // Equal but for the rounding of the sum, unless somebody moved the camera since.
+        const double slack = 1e-12 * (1 + glm::length(*set.origin));
+        view.camera.position =
+            view.localPosition && glm::distance(*view.localPosition, local) <= slack
+                ? *view.localPosition
+                : local;
+    }
+}
+
+/// What is known of a camera without a picture: its place and its size.
+void makeUnknown(ReferenceView& view) {
+    view.noDepth = NoDepth::unknown;
+    view.pruned = false;
+    std::ranges::fill(view.depth.pixels(), kNoDepth);
+    if (Rgba8Image* texture = view.texture.rgba8())
+        std::ranges::fill(texture->pixels(), glm::u8vec4(0, 0, 0, 255));
+    if (RgbaFloatImage* texture = view.texture.rgbaFloat())
+        std::ranges::fill(texture->pixels(), glm::vec4(0, 0, 0, 1));
+}
+
+/// Pictures of one bundle are all coded alike: where some hold linear light, the others' 8 bits
+/// become floats, too.
+void makeAllLinear(std::vector<ReferenceView>& views) {
+    const auto linear = [](const ReferenceView& view) { return view.texture.isLinear(); };
+    if (std::ranges::any_of(views, linear)) std::ranges::for_each(views, makeLinear);
+}
+
+}  // namespace
+
+Result<void> dropMissing(SetDescription& set, bool strict, Job& job) {
+    const auto isMissing = [](const SetView& view) { return view.missing.has_value(); };
+    const auto first = std::ranges::find_if(set.views, isMissing);
+    if (first == set.views.end()) return {};
+    const auto all = set.views.size();
+    const Error error = *first->missing;
+    const auto dropped = std::erase_if(set.views, isMissing);
+    if (strict || set.views.empty()) return tl::unexpected(error);
+    job.note(fmt::format("{} of {} views {} left out, as files are missing; the first: {}", dropped,
+                         all, dropped == 1 ? "is" : "are", error.text()));
+    return {};
+}
+
+Result<void> checkFilesAreThere(const SetDescription& set) {
+    for (const SetView& view : set.views)
+        for (const PictureSource* source : {&view.texture, &view.depth})
+            if (source->missing) return tl::unexpected(*source->missing);
+    return {};
+}
+
+Result<void> prepareToRead(SetDescription& set, const std::string& where,
+                           const ImageSetOptions& options, Job& job) {
+    useOrigin(set);
+    if (set.views.empty())
+        return failAt(where, ErrorCode::invalidInput,
+                      "it has no view; at least one with a picture and a depth image is expected");
+    STX_CHECK(dropMissing(set, options.strict, job));
+    STX_CHECK(checkFilesAreThere(set));
+    return checkViewCount(set.views.size(), job.limits, where);
+}
+
+Result<std::vector<ReferenceView>> loadOne(const SetView& view, const ImageSetOptions& options,
+                                           RefineReport& report, Job& job) {
+    try {
+        return loadSetView(view, options, report, job);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::failed, "view '{}': there is not enough memory", view.name);
+    }
+}
+
+Result<RefineReport> loadEach(
+    const SetDescription& set, const std::string& where, const ImageSetOptions& options,
+    std::size_t atOnce, Job& job, std::optional<std::size_t>* failing,
+    const std::function<Result<void>(std::size_t, std::vector<ReferenceView>)>& take) {
+    const std::size_t count = set.views.size();
+    std::vector<Result<void>> loaded(count);
+    // Notes and reports in the order of the views, whichever is ready first.
+    std::vector<RefineReport> reports(count);
+    std::vector<Job> jobs(count);
+    for (Job& own : jobs) own.workFor(job);
+    std::atomic<std::int64_t> done = 0;
+    std::atomic<bool> failed = false;
+    for (std::size_t first = 0; first < count && !failed; first += atOnce) {
+        const std::size_t end = std::min(first + atOnce, count);
+        parallelFor(
+            static_cast<std::int64_t>(first), static_cast<std::int64_t>(end), [&](std::int64_t i) {
+                const auto at = static_cast<std::size_t>(i);
+                if (failed) return;
+                loaded[at] = [&]() -> Result<void> {
+                    STX_TRY(auto views, loadOne(set.views[at], options, reports[at], jobs[at]));
+                    return take(at, std::move(views));
+                }();
+                if (!loaded[at]) failed = true;
+                job.progress(++done, static_cast<std::int64_t>(count), "reading views");
+            });
+    }
+    for (Job& own : jobs) own.passNotesOn();
+    for (std::size_t i = 0; i < count; ++i) {
+        if (loaded[i]) continue;
+        if (failing) *failing = i;
+        return tl::unexpected(loaded[i].error().at(where));
+    }
+    RefineReport report;
+    for (const RefineReport& ofView : reports) report.add(ofView);
+    return report;
+}
+
+void makeNamesUnique(std::vector<ReferenceView>& views) {
+    std::set<std::string> taken;
+    for (ReferenceView& view : views) {
+        if (view.name.empty()) view.name = "view";
+        std::string name = view.name;
+        for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", view.name, i);
+        view.name = std::move(name);
+    }
+}
+
+void makeLinear(ReferenceView& view) {
+    const Rgba8Image* coded = view.texture.rgba8();
+    if (!coded) return;
+    RgbaFloatImage floats(coded->width(), coded->height());
+    std::ranges::transform(coded->pixels(), floats.pixels().begin(), [](glm::u8vec4 c) {
+        return glm::vec4(linearFromSrgb8(c.r), linearFromSrgb8(c.g), linearFromSrgb8(c.b),
+                         static_cast<float>(c.a) / 255.0f);
+    });
+    view.texture = std::move(floats);
+}
+
+glm::dvec3 findOrigin(Bundle& bundle, const SetDescription& set, Job& job) {
+    if (set.origin) {
+        bundle.origin = *set.origin;
+        return glm::dvec3(0.0);
+    }
+    const auto origin = originFor(*bundle.bounds);
+    if (origin == glm::dvec3(0.0)) return origin;
+    bundle.origin = origin;
+    for (ReferenceView& view : bundle.views) view.camera.position -= origin;
+    bundle.bounds = Bounds{bundle.bounds->min - origin, bundle.bounds->max - origin};
+    job.note(fmt::format(
+        "the coordinates are too large for 32-bit floats: the origin {} {} {} is subtracted, and "
+        "kept beside them",
+        origin.x, origin.y, origin.z));
+    return origin;
+}
+
+Result<Bundle> readViews(SetDescription set, const std::string& where,
+                         const ImageSetOptions& options, Job& job,
+                         std::optional<std::size_t>* failing) {
+    STX_CHECK(prepareToRead(set, where, options, job));
+    std::uint64_t pixels = 0;
+    for (const SetView& view : set.views)
+        pixels += static_cast<std::uint64_t>(view.camera.width) * view.camera.height;
+    STX_CHECK(within(
+        where, job.limits.checkAllocation(
+                   pixels, sizeof(float) + sizeof(glm::u8vec4),
+                   fmt::format("{} views (take each N-th with --every N)", set.views.size()))));
+
+    std::vector<std::vector<ReferenceView>> loaded(set.views.size());
+    STX_TRY(RefineReport report,
+            loadEach(set, where, options, set.views.size(), job, failing,
+                     [&](std::size_t i, std::vector<ReferenceView> views) -> Result<void> {
+                         loaded[i] = std::move(views);
+                         return {};
+                     }));
+    Bundle bundle;
+    bundle.title = std::move(set.title);
+    for (std::size_t i = 0; i < loaded.size(); ++i) {
+        for (ReferenceView& view : loaded[i]) {
+            if (set.views[i].absent) makeUnknown(view);
+            bundle.views.push_back(std::move(view));
+        }
+    }
+    makeNamesUnique(bundle.views);
+    makeAllLinear(bundle.views);
+    if (!set.environment.empty()) {
+        STX_TRY(bundle.environment, readEnvironmentExr(set.environment, job));
+    }
+    bundle.bounds = bundle.computeBounds();
+    findOrigin(bundle, set, job);
+    STX_CHECK(attendToPoses(bundle, options, report, job));
+    if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));
+    if (set.photo && options.photo.behindPercent > 0) {
+        const BehindSettings settings{options.photo.behindPercent};
+        STX_TRY(const AddedBehind added, within(where, addBehind(bundle, settings, job)));
+        job.note(added.note(settings) + "; --behind none leaves it out");
+    }
+    if (options.refined) options.refined(report);
+    return bundle;
+}
+
+}  // namespace stx::imagesets

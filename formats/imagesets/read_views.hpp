@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/imagesets/image_sets.hpp"
+#include "formats/imagesets/set_view.hpp"
+#include "lib/model/view_table.hpp"
+
+/// From the description of a set to its views: all in memory, or as a table of views that are read
+/// when they are asked for.
+namespace stx::imagesets {
+
+/// Leaves out views whose files are not there, and says so. Errors when none is left, or `strict`.
+[[nodiscard]] Result<void> dropMissing(SetDescription& set, bool strict, Job& job);
+/// Errors with the first file of a view that is not there.
+[[nodiscard]] Result<void> checkFilesAreThere(const SetDescription& set);
+
+/// The views of a described frame in memory. `failing` becomes the number of the view that cannot
+/// be read, where it is that.
+[[nodiscard]] Result<Bundle> readViews(SetDescription set, const std::string& where,
+                                       const ImageSetOptions& options, Job& job,
+                                       std::optional<std::size_t>* failing = nullptr);
+
+/// The same views as a table. Where nothing looks at all of them at once, and they would take more
+/// than `held` bytes, each is read once here, for what is known of them before pixels are asked
+/// for, and again when it is asked for; else they are in memory.
+[[nodiscard]] Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set,
+                                                              const std::string& where,
+                                                              const ImageSetOptions& options,
+                                                              std::uint64_t held, Job& job);
+
+// What both ways have in common.
+
+/// Puts the cameras of a set that has an origin there, leaves out what is missing, and checks that
+/// the rest can be read.
+[[nodiscard]] Result<void> prepareToRead(SetDescription& set, const std::string& where,
+                                         const ImageSetOptions& options, Job& job);
+/// loadSetView(), with an error where the memory does not do.
+[[nodiscard]] Result<std::vector<ReferenceView>> loadOne(const SetView& view,
+                                                         const ImageSetOptions& options,
+                                                         RefineReport& report, Job& job);
+/// Loads all views, several at a time, and calls `take` with those of each, from any thread. Notes,
+/// and the errors of the first that fails, come in the order of the views. Gives what was refined.
+[[nodiscard]] Result<RefineReport> loadEach(
+    const SetDescription& set, const std::string& where, const ImageSetOptions& options,
+    std::size_t atOnce, Job& job, std::optional<std::size_t>* failing,
+    const std::function<Result<void>(std::size_t index, std::vector<ReferenceView> views)>& take);
+/// Names become part and file names: each is there once.
+void makeNamesUnique(std::vector<ReferenceView>& views);
+/// Colours of 8 bits become floats, of which they come back.
+void makeLinear(ReferenceView& view);
+/// Decides on the origin of a set whose bounds are known: Bundle::origin and bounds, the cameras.
+/// What was subtracted from these.
+glm::dvec3 findOrigin(Bundle& bundle, const SetDescription& set, Job& job);
+
+}  // namespace stx::imagesets

@@ -1,0 +1,187 @@
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "formats/exr/environment_exr.hpp"
+#include "formats/files/file_stamp.hpp"
+#include "formats/files/messages.hpp"
+#include "formats/imagesets/read_views.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/registration/disagreement_by_view.hpp"
+
+namespace stx::imagesets {
+namespace {
+
+/// What reading takes at its peak beside the images of a view that it gives, bytes a pixel: lines
+/// of files, depth as it was stored, and another copy of the images where a lens is undone.
+constexpr std::uint64_t kReadingTakes = 8;
+
+/// The files of a view as they were when it was read first.
+class FilesOfView {
+  public:
+    FilesOfView() = default;
+    explicit FilesOfView(const SetView& view) {
+        for (const PictureSource* source : {&view.texture, &view.depth, &view.mask})
+            if (!source->path.empty()) files_.emplace_back(source->path, stampOf(source->path));
+    }
+    /// Errors (invalidInput) with the first that has changed since.
+    [[nodiscard]] Result<void> check() const {
+        for (const auto& [file, stamp] : files_)
+            if (stampOf(file) != stamp) return changedError(file.string());
+        return {};
+    }
+
+  private:
+    static std::optional<FileStamp> stampOf(const std::filesystem::path& file) {
+        struct stat status {};
+        if (::stat(file.c_str(), &status) != 0) return {};
+        return FileStamp::of(status);
+    }
+    std::vector<std::pair<std::filesystem::path, std::optional<FileStamp>>> files_;
+};
+
+/// What the first look at each view leaves.
+struct Looked {
+    std::vector<ViewImageKinds> kinds;
+    std::vector<FilesOfView> files;
+    bool linear = false;         ///< some picture holds linear light: all are to
+    glm::dvec3 subtracted{0.0};  ///< from the cameras' places; see findOrigin()
+    std::unique_ptr<DisagreementByView> disagreement;
+};
+
+/// A set whose views are read again whenever they are asked for.
+class SetViews : public ViewTable {
+  public:
+    SetViews(Bundle headers, SetDescription set, std::string where, ImageSetOptions options,
+             Looked looked)
+        : ViewTable(std::move(headers), looked.kinds),
+          set_(std::move(set)),
+          where_(std::move(where)),
+          options_(std::move(options)),
+          looked_(std::move(looked)) {}
+
+    std::uint64_t bytesToMake(std::size_t index) const override {
+        return 2 * bytesOf(index) + kReadingTakes * pixelsOf(index);
+    }
+    std::string where() const override { return where_; }
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
+        // Its notes have been said, and what was refined has been told.
+        Job quiet;
+        quiet.workFor(job);
+        if (quiet.limits.keepDamaged) quiet.limits.keepDamaged = [](const std::string&) {};
+        RefineReport report;
+        auto loaded = loadOne(set_.views[index], options_, report, quiet);
+        STX_CHECK(job.checkCancelled());
+        STX_CHECK(within(where_, looked_.files[index].check()));
+        if (!loaded) return tl::unexpected(loaded.error().at(where_));
+        auto view = std::make_shared<ReferenceView>(std::move(loaded->front()));
+        view->name = about().views[index].name;
+        view->camera.position -= looked_.subtracted;
+        if (looked_.linear) makeLinear(*view);
+        if (looked_.disagreement->compare(index, view->depth, about()))
+            if (const auto note = disagreementNote(about(), looked_.disagreement->result(), false))
+                job.noteAbove(*note);
+        return view;
+    }
+
+  private:
+    SetDescription set_;
+    std::string where_;
+    ImageSetOptions options_;
+    Looked looked_;
+};
+
+/// Whether each view of a set can be made from its own files alone. One that repeats its camera's
+/// last picture, and the faces of panoramas, come from films and sets of few pictures.
+bool standAlone(const SetDescription& set, const ImageSetOptions& options) {
+    return !options.refine.atImport(RefineStep::poses, false) &&
+           !(set.photo && options.photo.behindPercent > 0) &&
+           std::ranges::none_of(set.views, [](const SetView& view) {
+               return view.panorama || view.absent || view.texture.film || view.depth.film;
+           });
+}
+
+/// Memory of the images of a set, at least; none where sizes are not known before they are read.
+std::optional<std::uint64_t> memoryOfImages(const SetDescription& set) {
+    std::uint64_t bytes = 0;
+    for (const SetView& view : set.views) {
+        if (view.camera.width <= 0 || view.camera.height <= 0) return {};
+        bytes += static_cast<std::uint64_t>(view.camera.width) *
+                 static_cast<std::uint64_t>(view.camera.height) *
+                 (sizeof(float) + sizeof(glm::u8vec4));
+    }
+    return bytes;
+}
+
+/// How many views may be read at a time under the limit, by the largest whose size is known. Errors
+/// (invalidInput): not even that one.
+Result<std::size_t> viewsAtOnce(const SetDescription& set, const Limits& limits) {
+    std::uint64_t most = 1;
+    for (const SetView& view : set.views) {
+        const auto pixels = static_cast<std::uint64_t>(std::max(view.camera.width, 0)) *
+                            static_cast<std::uint64_t>(std::max(view.camera.height, 0));
+        const std::uint64_t takes =
+            pixels * (2 * (sizeof(float) + sizeof(glm::u8vec4)) + kReadingTakes);
+        STX_CHECK(checkPeak({"reading", 0}, pixels, pixels, takes, limits));
+        most = std::max(most, takes);
+    }
+    return static_cast<std::size_t>(std::clamp<std::uint64_t>(
+        limits.maxMemoryBytes / most, 1, static_cast<std::uint64_t>(threadCount())));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::string& where,
+                                                const ImageSetOptions& options, std::uint64_t held,
+                                                Job& job) {
+    const auto memory = memoryOfImages(set);
+    if (set.views.size() < 2 || (memory && *memory <= held) || !standAlone(set, options)) {
+        STX_TRY(auto bundle, readViews(std::move(set), where, options, job));
+        return tableOf(std::move(bundle));
+    }
+    STX_CHECK(prepareToRead(set, where, options, job));
+    const std::size_t count = set.views.size();
+    Bundle headers;
+    headers.title = set.title;
+    headers.views.resize(count);
+    Looked looked;
+    looked.kinds.resize(count);
+    looked.disagreement = std::make_unique<DisagreementByView>(count);
+    for (const SetView& view : set.views) looked.files.emplace_back(view);
+    std::vector<Bounds> bounds(count);
+    const auto look = [&](std::size_t i, std::vector<ReferenceView> views) -> Result<void> {
+        const ReferenceView& view = views.front();
+        if (auto ok = view.check(); !ok)
+            return tl::unexpected(ok.error().at(fmt::format("view {}", i)));
+        static_cast<ViewHeader&>(headers.views[i]) = view;
+        headers.views[i].colourFile = {};
+        looked.kinds[i] = ViewImageKinds::of(view);
+        bounds[i] = view.computeBounds();
+        looked.disagreement->sample(i, view.depth);
+        return {};
+    };
+    STX_TRY(const std::size_t atOnce, within(where, viewsAtOnce(set, job.limits)));
+    STX_TRY(const RefineReport report, loadEach(set, where, options, atOnce, job, nullptr, look));
+    makeNamesUnique(headers.views);
+    looked.linear = std::ranges::any_of(looked.kinds, &ViewImageKinds::linear);
+    for (ViewImageKinds& kinds : looked.kinds) kinds.linear = looked.linear;
+    if (!set.environment.empty()) {
+        STX_TRY(headers.environment, readEnvironmentExr(set.environment, job));
+    }
+    headers.bounds.emplace();
+    for (const Bounds& one : bounds) {
+        if (one.empty()) continue;
+        headers.bounds->add(one.min);
+        headers.bounds->add(one.max);
+    }
+    looked.subtracted = findOrigin(headers, set, job);
+    if (options.refined) options.refined(report);
+    return std::make_unique<SetViews>(std::move(headers), std::move(set), where, options,
+                                      std::move(looked));
+}
+
+}  // namespace stx::imagesets

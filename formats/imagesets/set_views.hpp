@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+
+#include "formats/imagesets/image_sets.hpp"
+#include "lib/model/view_table.hpp"
+
+namespace stx {
+
+/// Images of a set that take no more than so many bytes are all in memory when it is opened as a
+/// table: that is faster than to read each picture twice, and hardly shows beside the program.
+[[nodiscard]] std::uint64_t heldOfSets(const Limits& limits);
+/// The views of readImageSet() as a table. Of a set of one moment whose images take more than
+/// `held` bytes, each view is read once here, for its planes and marks, and again when it is asked
+/// for; a file that changes meanwhile is an error (invalidInput). Views that are taken together are
+/// in memory all the same: where poses are refined, panoramas, and frames of films. That views
+/// disagree is noted when the last of them has been asked for.
+[[nodiscard]] Result<std::unique_ptr<ViewTable>> openSetViews(const std::filesystem::path& path,
+                                                              const ImageSetOptions& options,
+                                                              Job& job, std::uint64_t held);
+
+}  // namespace stx

@@ -1,0 +1,105 @@
+#include "lib/registration/disagreement_by_view.hpp"
+
+#include <algorithm>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "lib/registration/overlap.hpp"
+
+namespace stx {
+
+using registration::GridOfPoints;
+using registration::OfPair;
+using registration::Pair;
+
+struct DisagreementByView::State {
+    struct OfView {
+        GridOfPoints probes;    ///< by which it is found who overlaps
+        GridOfPoints measured;  ///< by which its pairs are measured
+        /// The pairs from it that overlap most of those that have been looked at, widest first.
+        std::vector<std::pair<Pair, OfPair>> pairs;
+        bool compared = false;
+    };
+    OverlapSettings settings;
+    std::vector<OfView> views;
+    std::size_t left = 0;  ///< that compare() has not had yet
+    std::mutex mutex;      ///< of `pairs`, `compared` and `left`
+
+    /// Where a pair comes among those of its view: as overlappingPairs() sorts them.
+    static bool before(const Pair& a, const Pair& b) {
+        return a.overlap != b.overlap ? a.overlap > b.overlap : a.to < b.to;
+    }
+    /// Whether a pair is among the widest so far.
+    bool matters(const OfView& from, const Pair& pair) const {
+        return from.pairs.size() < static_cast<std::size_t>(settings.neighbours) ||
+               (!from.pairs.empty() && before(pair, from.pairs.back().first));
+    }
+};
+
+DisagreementByView::DisagreementByView(std::size_t views, const OverlapSettings& settings)
+    : state_(std::make_unique<State>()) {
+    state_->settings = settings;
+    state_->views.resize(views);
+    state_->left = views;
+}
+
+DisagreementByView::~DisagreementByView() = default;
+
+void DisagreementByView::sample(std::size_t index, const Image<float>& depth) {
+    State::OfView& view = state_->views[index];
+    view.probes =
+        registration::gridOfPoints(depth, registration::probesAmong(state_->views.size()));
+    view.measured = registration::gridOfPoints(depth, registration::kMeasured);
+    view.measured.points.shrink_to_fit();  // all views have one
+}
+
+bool DisagreementByView::compare(std::size_t index, const Image<float>& depth,
+                                 const Bundle& bundle) {
+    State& state = *state_;
+    {
+        const std::lock_guard lock(state.mutex);
+        if (std::exchange(state.views[index].compared, true)) return false;
+    }
+    const DepthView to{&bundle.views[index], &depth};
+    for (std::size_t i = 0; i < state.views.size(); ++i) {
+        const ViewHeader& own = bundle.views[i];
+        if (i == index || own.background != to.header->background) continue;
+        State::OfView& from = state.views[i];
+        const Pair pair{
+            static_cast<int>(i), static_cast<int>(index),
+            registration::commonPoints(from.probes, own.camera, to, state.settings.overlapTolerance)
+                .overlap()};
+        if (!(pair.overlap >= state.settings.minOverlap)) continue;
+        {
+            const std::lock_guard lock(state.mutex);
+            if (!state.matters(from, pair)) continue;
+        }
+        const OfPair found =
+            registration::measurePair(from.measured, own, to, state.settings.overlapTolerance);
+        const std::lock_guard lock(state.mutex);
+        const auto place = std::ranges::find_if(
+            from.pairs, [&](const auto& other) { return State::before(pair, other.first); });
+        from.pairs.emplace(place, pair, found);
+        if (from.pairs.size() > static_cast<std::size_t>(state.settings.neighbours))
+            from.pairs.pop_back();
+    }
+    const std::lock_guard lock(state.mutex);
+    if (--state.left > 0) return false;
+    for (State::OfView& view : state.views) view.probes = view.measured = {};
+    return true;
+}
+
+DepthDisagreement DisagreementByView::result() const {
+    std::vector<Pair> pairs;
+    std::vector<OfPair> found;
+    for (const State::OfView& view : state_->views) {
+        for (const auto& [pair, ofPair] : view.pairs) {
+            pairs.push_back(pair);
+            found.push_back(ofPair);
+        }
+    }
+    return registration::togetherOf(pairs, found, state_->views.size());
+}
+
+}  // namespace stx
