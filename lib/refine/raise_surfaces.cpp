@@ -17,6 +17,10 @@ namespace {
 /// A sample is mixed where it is farther than this share of the step from both of its sides, and
 /// the sides are flatter than the second share.
 constexpr float kMixed = 0.2f, kFlatSide = 0.4f;
+/// And the step is more than this share of the nearer 1/z: lesser ones, as from a nose to a cheek,
+/// stay slopes, for what lies behind a photograph's person would show in a cut. Of aloe 0.85 % are
+/// off with it, 0.78 % with 0.04, and 1.26 % with 0.1.
+constexpr float kMixedStep = 0.07f;
 /// How far a sample speaks for what is beside it, samples.
 constexpr double kNearSamples = 0.9;
 /// Least deviation of the colours of a sample, of 0..1.
@@ -83,7 +87,7 @@ void CoarseDepth::findMixed() {
             for (const auto& [dx, dy] : kWays) {
                 const float a = clampedAt(x - dx, y - dy), b = clampedAt(x + dx, y + dy);
                 const float step = std::abs(b - a), low = std::min(a, b), high = std::max(a, b);
-                if (low <= 0 || step <= 2 * kAlikeDepth * high) continue;
+                if (low <= 0 || step <= kMixedStep * high) continue;
                 if (std::min(high - own, own - low) > kMixed * step &&
                     std::abs(clampedAt(x - 2 * dx, y - 2 * dy) - a) < kFlatSide * step &&
                     std::abs(clampedAt(x + 2 * dx, y + 2 * dy) - b) < kFlatSide * step)

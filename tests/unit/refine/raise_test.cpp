@@ -215,5 +215,18 @@ TEST(RaiseDepth, AnyNumberOfThreadsGivesTheSameBytes) {
     EXPECT_EQ(with(1), with(4));
 }
 
+// Cut open, the cheek behind a nose showed the wall behind the head from the side.
+TEST(RaiseDepth, SmallStepsStaySlopes) {
+    Image<float> depth(10, 10);
+    for (int y = 0; y < 10; ++y)
+        for (int x = 0; x < 10; ++x) depth.at(x, y) = 1 / (x < 5 ? 1.0f : x == 5 ? 0.975f : 0.95f);
+    const Image<float> raised =
+        raiseDepth(depth, Texture(Rgba8Image(80, 80, glm::u8vec4(180, 140, 120, 255))));
+    for (int y = 0; y < 80; ++y)
+        for (int x = 1; x < 80; ++x)
+            EXPECT_LT(std::abs(1 / raised.at(x, y) - 1 / raised.at(x - 1, y)), 0.03f)
+                << x << " " << y;
+}
+
 }  // namespace
 }  // namespace stx
