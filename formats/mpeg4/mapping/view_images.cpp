@@ -68,9 +68,10 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
     }
     STX_TRY(out.depth, depthPng(view.depth, code, out.padding, out.worstDepth));
     // Copies of large pictures would be half of the memory of writing.
+    const Rgba8Image* own = view.texture.rgba8();
     Rgba8Image coded;
-    if (view.texture.isLinear()) coded = rgba8FromTexture(view.texture, out.clamped);
-    const Rgba8Image& colour = view.texture.isLinear() ? coded : *view.texture.rgba8();
+    if (!own) coded = rgba8FromTexture(view.texture, out.clamped);
+    const Rgba8Image& colour = own ? *own : coded;
     const bool alpha = !alphaFollowsDepth(colour, view.depth);
     if (mayBeUnknown) out.unknown = options.h264 >= 0 ? kUnknownAll : kUnknownInAlpha;
     if (options.texture == SceneWriteOptions::Texture::jpeg) {
