@@ -398,8 +398,12 @@ Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle b
         STX_CHECK(checkPlaces(bundle.views[i], surfaces[i].positions));
         STX_CHECK(checkPlaces(bundle.views[i], surfaces[i].lonePositions));
     }
-    if (options.mostTriangles > 0)
+    if (options.mostTriangles > 0) {
+        std::uint64_t triangles = 0;
+        for (const ViewSurface& s : surfaces) triangles += s.triangles.size() / 3;
+        STX_CHECK(checkPeakOfTriangles(triangles, bundle.views, job.limits));
         STX_CHECK(takeFewerTriangles(bundle, options.mostTriangles, surfaces, job));
+    }
     Writer writer(bundle, options.jpegQuality, job);
     writer.report.views = bundle.views.size();
     for (std::size_t i = 0; i < surfaces.size(); ++i) {

@@ -14,6 +14,10 @@ struct PeakMemory {
     std::string_view what;  ///< for the message: "drawing"
     /// Bytes for each pixel of all views, and of the largest one, which is worked on by itself.
     std::uint64_t perPixel, perPixelOfLargest = 0;
+    /// Of views in memory: for each pixel without a point instead, where that is less.
+    std::uint64_t perEmpty = perPixel;
+    /// For each pixel, where more shows on the way: what a refusal names, so that it is enough.
+    std::uint64_t perPixelAtMost = 0;
 };
 
 /// Each step's, rounded up: the largest memory of the process with one view of 16 million pixels
@@ -33,7 +37,9 @@ inline constexpr PeakMemory kCompared = {"two pictures that are compared", 36};
 inline constexpr PeakMemory kComparedLinear = {"two pictures that are compared", 76};
 inline constexpr PeakMemory kExport = {"writing pictures", 0, 16};
 inline constexpr PeakMemory kFewerSplats = {"merging splats", 140};
-inline constexpr PeakMemory kFewerTriangles = {"fewer triangles", 228};
+// Beyond surfaces it is checked by what they have: kPerTriangle, and kPerPixelOfTriangles.
+inline constexpr PeakMemory kFewerTriangles = {"fewer triangles", 76, 94, 20, 248};
+inline constexpr std::uint64_t kPerTriangle = 115, kPerPixelOfTriangles = 16;
 // With normals that are made for light.
 inline constexpr PeakMemory kLitSplatMode = {"drawing lit splats", 20};
 inline constexpr PeakMemory kLitSurfaceMode = {"drawing in light", 44};
@@ -50,7 +56,7 @@ inline constexpr PeakMemory kSplatMode = {"drawing splats", 8};
 inline constexpr PeakMemory kSplats = {"splats", 118};
 inline constexpr PeakMemory kSummary = {"summaries of views", 24};
 inline constexpr PeakMemory kSurfaceMode = {"drawing", 14};
-inline constexpr PeakMemory kSurfaces = {"surfaces", 76, 94};
+inline constexpr PeakMemory kSurfaces = {"surfaces", 76, 94, 20};
 // Where the memory of a device is that of the process.
 inline constexpr PeakMemory kSplatsBySoftware = {"drawing by a software driver", 32};
 inline constexpr PeakMemory kSurfacesBySoftware = {"drawing by a software driver", 70};
@@ -60,6 +66,10 @@ inline constexpr PeakMemory kSurfacesBySoftware = {"drawing by a software driver
 /// how much would do.
 [[nodiscard]] Result<void> checkPeak(const PeakMemory& step,
                                      const std::vector<ReferenceView>& views, const Limits& limits);
+/// The same of the step's triangles, once they are known.
+[[nodiscard]] Result<void> checkPeakOfTriangles(std::uint64_t triangles,
+                                                const std::vector<ReferenceView>& views,
+                                                const Limits& limits);
 /// The same of other pixels, whose own images take `held` bytes.
 [[nodiscard]] Result<void> checkPeak(const PeakMemory& step, std::uint64_t pixels,
                                      std::uint64_t largest, std::uint64_t held,
