@@ -92,7 +92,9 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
             if (!p.seen) continue;
             const splat::BlockTask& t = p.task;
             densest = std::max(densest, p.density);
-            heaviest = std::max(heaviest, double(t.quality));
+            // The paper's rule weighs all views alike.
+            heaviest =
+                std::max(heaviest, settings.splat == SplatRule::data ? double(t.quality) : 1.0);
             const auto add = [&](int u0, int v0, int u1, int v1) {
                 const TaskEntry entry{
                     static_cast<std::uint32_t>(u0) | static_cast<std::uint32_t>(v0) << 16,
