@@ -142,7 +142,7 @@ Result<std::vector<Finding>> validateViews(const ViewTable& table, Job& job) {
     std::vector<Findings> found(table.count());
     std::vector<std::int64_t> points(table.count());
     const auto look = [&](std::size_t i,
-                          std::shared_ptr<const ReferenceView> view) -> Result<void> {
+                          const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
         points[i] = checkWholeView(*view, i, found[i]);
         return {};
     };

@@ -21,7 +21,7 @@ Result<std::vector<Finding>> validateImageSet(const std::filesystem::path& path,
             findings.add(1003, viewText(i, set->views[i].name), fmt::format("no file '{}'", name),
                          "the file");
     if (!findings.list.empty() || !options.pixels) return findings.list;
-    const auto views = [&]() -> Result<std::vector<Finding>> {
+    auto views = [&]() -> Result<std::vector<Finding>> {
         STX_TRY(const auto table, openSetViews(path, {}, job, heldOfSets(job.limits)));
         return validateViews(*table, job);
     }();

@@ -13,7 +13,7 @@ namespace stx {
 struct PeakMemory {
     std::string_view what;  ///< for the message: "drawing"
     /// Bytes for each pixel of all views, and of the largest one, which is worked on by itself.
-    std::uint64_t perPixel, perPixelOfLargest = 0;
+    std::uint64_t perPixel = 0, perPixelOfLargest = 0;
     /// Of views in memory: for each pixel without a point instead, where that is less.
     std::uint64_t perEmpty = perPixel;
     /// For each pixel, where more shows on the way: what a refusal names, so that it is enough.
