@@ -23,7 +23,7 @@ SIDE, PART, ZOOM = 240, 56, 2  # pixels of a frame and of the part that is shown
 VIEWS = 160                    # pixels of a view
 # Where another capture than the one that changes most says more of what a stage is for.
 SHOWN_OF = {"unmeasured": "unmeasured", "surroundings": "room", "levels": "exact", "sharpen": "exact", "settle": None, "exposure": "exposed",
-            "strays": "noisy", "nearer": "exact", "closing": "few", "mean": "exact"}
+            "strays": "noisy", "nearer": "exact", "closing": "few", "mean": "exact", "rims": "alone"}
 RANDOM = np.random.default_rng(7)
 
 
@@ -115,6 +115,7 @@ def captures(folder):
         "grid": (noisy(stx.convert(model, views="octahedral:4", size=size)), around), "noisy": (noisy(sphere), around),
         "exposed": (exposed(stx.convert(model, views="sphere:16", size=(256, 256))), around), "fat": (fat(sphere), around), "missing": (missing(sphere), around),
         "glass": (glass(sphere), around), "room": (room, inside), "unmeasured": (unmeasured(room), inside), "apart": (apart(room), inside),
+        "alone": (stx.Bundle([room.views[0]]), inside),
     }
 
 

@@ -15,6 +15,7 @@ CONSTANT uint kCellNearEdge = 16u;
 CONSTANT uint kEdgePixel = 32u;  // lays out an extension
 CONSTANT uint kBesideBackground = 64u;
 CONSTANT uint kCreasePixel = 128u;  // see creases.hpp
+CONSTANT uint kRimPixel = 2048u;  // see rims.hpp
 CONSTANT int kDistanceShift = 8;  // distance to the nearest edge
 CONSTANT uint kDistanceMask = 7u;
 CONSTANT int kLeafShift = 16;  // the leaf's number in its block

@@ -27,7 +27,8 @@ CONSTANT float kExtensionReach = 0.02f;
 // An extension beside background is drawn over what its source shows behind it (by kLinkedSamples), so that faces
 // that views see one by one meet at their edge. Not where its q changes by this share over its half side: there
 // what turns away ends sooner. Of 121 random cases 0.002, 0.006 and 0.02 raise the mean by 0.03, 0.04 and 0.04 dB,
-// the last with a torus 0.9 dB worse; over inner edges, too, spheres-miv loses 0.3 dB.
+// the last with a torus 0.9 dB worse; over all inner edges, too, spheres-miv loses 0.3 dB: of these only rims of
+// captured views do (rims.hpp).
 CONSTANT float kExtensionCovers = 0.006f;
 
 // Fusing them.

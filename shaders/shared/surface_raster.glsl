@@ -82,10 +82,10 @@ void drawLeaf(float x, float y, float size, float q0, float qx, float qy) {
 
 // The square around an edge pixel, whose middle is at (x, y), with the slope (gx, gy) of its q.
 // `scale` is what a relative difference of 1 is in q there.
-void drawExtension(float x, float y, float q, float gx, float gy, float scale, bool besideBackground) {
+void drawExtension(float x, float y, float q, float gx, float gy, float scale, bool besideBackground, bool rim) {
     float side = besideBackground ? kHalfBesideBackground : kHalfInside;
     float reach = kExtensionReach * scale;
-    bool covers = besideBackground && (abs(gx) + abs(gy)) * side < kExtensionCovers * scale;
+    bool covers = (besideBackground || rim) && (abs(gx) + abs(gy)) * side < kExtensionCovers * scale;
     float plus = clamp(gx * side + gy * side, -reach, reach);
     float minus = clamp(gx * side - gy * side, -reach, reach);
     fillQuad(cornerAt(x - side, y - side, q - plus), cornerAt(x + side, y - side, q + minus),

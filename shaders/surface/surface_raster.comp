@@ -47,7 +47,8 @@ void main() {
 #if EXTEND
     if ((code & kEdgePixel) == 0u) return;
     vec2 g = gradientAt(s, place, 0, 0);
-    drawExtension(x, y, q, g.x, g.y, coarseOf(s) * relativeScale(axisOf(s), q), (code & kBesideBackground) != 0u);
+    drawExtension(x, y, q, g.x, g.y, coarseOf(s) * relativeScale(axisOf(s), q), (code & kBesideBackground) != 0u,
+                  (code & kRimPixel) != 0u);
 #else
     uint shape = code & kShapeMask;
     if (shape == kNoCell) return;

@@ -18,6 +18,7 @@ namespace stx {
     STAGE(unmeasured, both, "colours without depth are drawn where nothing else is", \
           "Bleyer, Rhemann & Rother 2011") \
     STAGE(creases, surface, "pixels that mix two faces give their colour to neither", "") \
+    STAGE(rims, surface, "pixels at inner edges with the colour of the front are all front", "") \
     STAGE(levels, surface, "outlines run where the covered parts of pixels tell", "Youngs 1982") \
     STAGE(sharpen, surface, "colours are as much sharper as fitting them blurs them", "") \
     STAGE(blend, surface, "captured views that disagree are blended where they show the same", "") \

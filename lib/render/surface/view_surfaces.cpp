@@ -386,6 +386,7 @@ Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job) {
     STX_CHECK(checkPeak(peak::kSurfaces, bundle.views, job.limits));
     RenderSettings settings;
     settings.without.add(Stage::sharpen);
+    settings.without.add(Stage::rims);
     const SurfaceScene scene(bundle, settings);
     STX_CHECK(job.checkCancelled());
     Maker maker(scene);

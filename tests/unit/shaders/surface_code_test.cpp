@@ -77,8 +77,10 @@ struct ScalarRaster {
             const vec2 g = s.gradient(x, y);
             const float q = s.q(x, y);
             const Place at = s.placeOf(x, y);
-            drawExtension(x + 0.5f, y + 0.5f, q, g.x, g.y, s.space.axis.relativeScale(q),
-                          s.infoAt(at, 0, 0) & Info::kBesideBackground);
+            drawExtension(
+                x + 0.5f, y + 0.5f, q, g.x, g.y, s.space.axis.relativeScale(q),
+                s.infoAt(at, 0, 0) & Info::kBesideBackground,
+                s.blocks[y / kBlock * s.blocksX + x / kBlock].rims[y % kBlock] >> x % kBlock & 1);
         });
     }
 };

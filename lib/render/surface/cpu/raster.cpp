@@ -300,7 +300,9 @@ HWY_NOINLINE void drawExtensions(Target& t, const Source& s, const Warp& warp,
             gy[count] = g.y;
             const float scale = s.space.axis.stepScale(*at);
             reaches[count] = kExtensionReach * scale;
-            const bool covers = outside && std::abs(g.x) + std::abs(g.y) < kExtensionCovers * scale;
+            const bool rim = block.rims[static_cast<std::size_t>(j)] >> i & 1;
+            const bool covers =
+                (outside || rim) && std::abs(g.x) + std::abs(g.y) < kExtensionCovers * scale;
             flags[count] = kExtensionBit | kNearEdgeBit | (covers ? kCoversBit : 0u);
             if (++count == n) flush();
         }

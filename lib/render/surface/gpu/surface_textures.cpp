@@ -86,6 +86,7 @@ Image<std::uint32_t> cellCodes(const Source& s) {
                     if (info & surface::Info::kBesideBackground) code |= surface::kBesideBackground;
                     if (info & surface::Info::kCrease) code |= surface::kCreasePixel;
                     if (block.edges[j] >> i & 1) code |= surface::kEdgePixel;
+                    if (block.rims[j] >> i & 1) code |= surface::kRimPixel;
                     if (!(block.cells[j] >> i & 1)) continue;
                     code |= surface::cellShape(s, texels, i, j);
                     if (surface::cellNearEdge(texels, i, j)) code |= surface::kCellNearEdge;

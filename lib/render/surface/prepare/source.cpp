@@ -7,6 +7,7 @@
 #include "lib/render/surface/prepare/creases.hpp"
 #include "lib/render/surface/prepare/draft.hpp"
 #include "lib/render/surface/prepare/outline_levels.hpp"
+#include "lib/render/surface/prepare/rims.hpp"
 #include "lib/render/surface/prepare/sharpen.hpp"
 #include "lib/render/surface/prepare/source_rows.hpp"
 
@@ -263,7 +264,7 @@ void prepareUnread(Source& s) {
 }
 
 /// Links, edges, planar pieces and outlines of a source, from its points.
-void prepareSource(Source& s, const RenderSettings& settings, bool blends,
+void prepareSource(Source& s, const RenderSettings& settings, bool blends, bool rims,
                    std::vector<PreparedPage>& pages) {
     s.set->settle();
     const Camera& camera = s.view->camera;
@@ -298,6 +299,10 @@ void prepareSource(Source& s, const RenderSettings& settings, bool blends,
     if (settings.does(Stage::creases)) {
         const StageTimer timer(settings.log.get(), "creases", true, inThread);
         findCreases(s, d);
+    }
+    if (rims) {
+        const StageTimer timer(settings.log.get(), "rims", true, inThread);
+        findRims(s, d);
     }
     if (s.hasAlpha) {
         const StageTimer timer(settings.log.get(), "levels", true, inThread);
@@ -366,10 +371,12 @@ void SurfaceScene::prepare(const RenderSettings& settings) {
     blends = settings.does(Stage::blend) && std::ranges::any_of(sources, [](const Source& s) {
                  return disagree(s.view->refined);
              });
+    // Of several exact views the others know better where what is in front ends.
+    const bool rims = settings.does(Stage::rims) && (sources.size() < 2 || blends);
     const bool whole = std::ranges::all_of(sources, [](const Source& s) { return s.view->whole; });
     if (whole) {
         parallelFor(0, static_cast<std::int64_t>(sources.size()), [&](std::int64_t i) {
-            prepareSource(sources[static_cast<std::size_t>(i)], settings, blends, pages);
+            prepareSource(sources[static_cast<std::size_t>(i)], settings, blends, rims, pages);
         });
         return;
     }
@@ -380,7 +387,7 @@ void SurfaceScene::prepare(const RenderSettings& settings) {
         pages[i].levels = Image<std::uint8_t>(page.width(), page.height(), 0);
     }
     // One after the other: a draft takes the memory of a whole view.
-    for (Source& s : sources) prepareSource(s, settings, blends, pages);
+    for (Source& s : sources) prepareSource(s, settings, blends, rims, pages);
     for (Source& s : sources)
         if (!s.whole) s.placeOfBlock = placesOfBlocks(s);
 }

@@ -41,6 +41,9 @@ struct SourceBlock : BlockRange {
     std::uint32_t leafBegin = 0, leafEnd = 0;
     std::array<std::uint16_t, kBlock> cells{};  ///< 2x2 quads, by upper left pixel, in no leaf
     std::array<std::uint16_t, kBlock> edges{};  ///< pixels that lay out an extension
+    /// Of these, not beside background, those whose extension covers what their source shows
+    /// behind.
+    std::array<std::uint16_t, kBlock> rims{};
     bool anyCell = false, anyEdge = false;
 };
 

@@ -62,6 +62,7 @@ ViewSummary summaryOf(const ReferenceView& view) {
     const PageSet set(alone);
     RenderSettings settings;
     settings.without.add(Stage::creases);
+    settings.without.add(Stage::rims);
     const SurfaceScene scene(set, settings);
     const Source& s = scene.sources.front();
 
