@@ -39,8 +39,9 @@ using PartOfView = std::function<PixelPart(std::size_t view, int x0, int y0, int
 /// Calls its argument with the number of each view, from any thread; `PartOfView` is asked for that
 /// view alone meanwhile.
 using EachView = std::function<Result<void>(const std::function<void(std::size_t view)>& body)>;
-/// The same of views that are not all there at a time: `each` is called three times, where views
-/// have few points inside of surfaces six times. Errors: those of `each`.
+/// The same of views that are not all there at a time: `each` is called twice, where very many
+/// views show the same three times; where views have few points inside of surfaces twice as often.
+/// Errors: those of `each`.
 [[nodiscard]] Result<std::vector<ColourMap>> exposureMaps(std::span<const Camera> cameras,
                                                           const PartOfView& partOf,
                                                           const EachView& each);

@@ -93,11 +93,16 @@ class PartNeeds {
             const ReferenceView& view = *now_[k];
             return PixelPart{&view.texture, &view.depth, 0, 1, view.camera.width};
         };
-        const auto eachView = [&](const std::function<void(std::size_t)>& body) {
+        const auto isKnown = [&] { return depthDone_ && depth_.any(); };
+        const auto eachView = [&](const std::function<void(std::size_t)>& body) -> Result<void> {
+            // Colours need not be looked at any more.
+            if (isKnown()) return fail(ErrorCode::failed, "depth is refined");
             return each(body);
         };
-        STX_TRY(const auto maps, exposureMaps(cameras, partOf, eachView));
-        return depth_.any() || !std::ranges::all_of(maps, &ColourMap::changesNothing);
+        auto maps = exposureMaps(cameras, partOf, eachView);
+        if (isKnown()) return true;
+        if (!maps) return propagate(maps);
+        return !std::ranges::all_of(*maps, &ColourMap::changesNothing);
     }
 
   private:

@@ -12,7 +12,8 @@ namespace stx {
 /// Whether refine() may change something in views that are read one by one. False: it would leave
 /// them as they are, to the bit. True without a look at pixels of what is captured, whose views
 /// only tell side by side. False without a look at pixels where saidToBeExact(). Else views are
-/// read three times, without `exposure` once. Errors: those of the views, cancelled.
+/// read once, and with `exposure`, where depth stays as it is, once more; see exposureMaps().
+/// Errors: those of the views, cancelled.
 [[nodiscard]] Result<bool> mayRefine(const ViewTable& table, const RefineSettings& settings,
                                      Job& job);
 

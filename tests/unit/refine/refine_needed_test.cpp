@@ -56,14 +56,14 @@ void expectNeeds(const Bundle& bundle, const RefineSettings& settings, bool need
 
 TEST(RefineNeeded, NotOfExactViews) {
     const Bundle torus = torusViews(96);
-    expectNeeds(torus, {}, false, 6);
-    expectNeeds(torus, RefineSettings().forSplats(), false, 6);
+    expectNeeds(torus, {}, false, 2);
+    expectNeeds(torus, RefineSettings().forSplats(), false, 2);
     RefineSettings without;
     without.set(RefineStep::exposure, false);
     expectNeeds(torus, without, false, 1);
     expectNeeds(torus, RefineSettings::none(), false, 0);
     for (const AnalyticScene scene : {AnalyticScene::object, AnalyticScene::room})
-        expectNeeds(analyticBundle(scene, 6), {}, false, 6);
+        expectNeeds(analyticBundle(scene, 6), {}, false, 4);
 }
 
 TEST(RefineNeeded, ReadsWhatIsBehindByItself) {
@@ -77,7 +77,7 @@ TEST(RefineNeeded, ReadsWhatIsBehindByItself) {
 TEST(RefineNeeded, OfNoise) {
     Bundle noisy = torusViews(96);
     noisy::addNoise(noisy, 0.01);
-    expectNeeds(noisy, {}, true, 6);
+    expectNeeds(noisy, {}, true, 1);
     // Once is enough.
     for (ReferenceView& view : noisy.views) view.refined.steps = "noise";
     expectNeeds(noisy, {}, false, 0);
@@ -88,7 +88,7 @@ TEST(RefineNeeded, OfNoiseThatNoSmallViewHasEnoughOf) {
     Bundle noisy = torusViews(24);
     noisy::addNoise(noisy, 0.01);
     for (const ReferenceView& view : noisy.views) ASSERT_LT(view.pointCount(), 500);
-    expectNeeds(noisy, {}, true, 6);
+    expectNeeds(noisy, {}, true, 1);
 }
 
 TEST(RefineNeeded, OfACameraThatExposesForItself) {
@@ -97,7 +97,7 @@ TEST(RefineNeeded, OfACameraThatExposesForItself) {
         const glm::vec3 dark = 0.9f * glm::vec3(c) + 5.0f;
         if (c.a > 0) c = glm::u8vec4(glm::u8vec3(dark + 0.5f), c.a);
     }
-    expectNeeds(bundle, {}, true, 6);
+    expectNeeds(bundle, {}, true, 4);
     RefineSettings without;
     without.set(RefineStep::exposure, false);
     expectNeeds(bundle, without, false, 1);
