@@ -55,15 +55,13 @@ struct Triangle {
 
 class Maker {
   public:
-    explicit Maker(const SurfaceScene& scene)
-        : scene_(scene), triangles_(scene.sources.size()), used_(scene.sources.size()) {}
+    explicit Maker(const SurfaceScene& scene) : scene_(scene), used_(scene.sources.size()) {}
 
-    /// Before surfaceOf() of any: all triangles of a view.
+    /// Before surfaceOf() of any. Triangles are found again then: those of all views are many.
     void prepare(std::size_t number) {
         const Source& s = scene_.sources[number];
-        triangles_[number] = trianglesOf(s);
         used_[number].resize(static_cast<std::size_t>(s.width) * s.height);
-        for (const Triangle& t : triangles_[number])
+        for (const Triangle& t : trianglesOf(s))
             for (const std::uint32_t corner : t.corners) used_[number][corner] = true;
     }
 
@@ -139,7 +137,7 @@ class Maker {
         const std::size_t count = used.size();
         std::vector<std::uint32_t> numbers(count, kNone);
         ViewSurface out;
-        for (const Triangle& t : triangles_[source]) {
+        for (const Triangle& t : trianglesOf(s)) {
             if (shownBetter(s, t)) continue;
             for (const std::uint32_t corner : t.corners) {
                 std::uint32_t& number = numbers[corner];
@@ -375,28 +373,47 @@ class Maker {
     }
 
     const SurfaceScene& scene_;
-    std::vector<std::vector<Triangle>> triangles_;  ///< of each source
-    std::vector<std::vector<bool>> used_;           ///< pixels that are corners
+    std::vector<std::vector<bool>> used_;  ///< of each source: pixels that are corners
 };
 
 }  // namespace
 
-Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job) {
+Result<void> forEachSurface(
+    const Bundle& bundle, PixelSpool* spool, Job& job,
+    const std::function<Result<void>(std::size_t index, ViewSurface surface)>& take) {
     STX_CHECK(bundle.check());
-    STX_CHECK(checkPeak(peak::kSurfaces, bundle.views, job.limits));
+    if (!spool) STX_CHECK(checkPeak(peak::kSurfaces, bundle.views, job.limits));
     RenderSettings settings;
     settings.without.add(Stage::sharpen);
-    const SurfaceScene scene(bundle, settings);
+    const SurfaceScene scene(spool ? PageSet(bundle, *spool) : PageSet(bundle), settings);
     STX_CHECK(job.checkCancelled());
     Maker maker(scene);
-    std::vector<ViewSurface> out(bundle.views.size());
-    const auto count = static_cast<std::int64_t>(out.size());
+    const auto count = static_cast<std::int64_t>(bundle.views.size());
     parallelFor(0, count, [&](std::int64_t i) { maker.prepare(static_cast<std::size_t>(i)); });
-    parallelFor(0, count, [&](std::int64_t i) {
-        if (job.cancelled) return;
-        out[static_cast<std::size_t>(i)] = maker.surfaceOf(static_cast<std::size_t>(i));
-    });
-    STX_CHECK(job.checkCancelled());
+    const std::int64_t atOnce = std::max<std::int64_t>(1, threadCount());
+    for (std::int64_t first = 0; first < count; first += atOnce) {
+        const std::int64_t end = std::min(first + atOnce, count);
+        std::vector<ViewSurface> found(static_cast<std::size_t>(end - first));
+        parallelFor(first, end, [&](std::int64_t i) {
+            if (job.cancelled) return;
+            found[static_cast<std::size_t>(i - first)] =
+                maker.surfaceOf(static_cast<std::size_t>(i));
+        });
+        STX_CHECK(job.checkCancelled());
+        for (std::int64_t i = first; i < end; ++i)
+            STX_CHECK(take(static_cast<std::size_t>(i),
+                           std::move(found[static_cast<std::size_t>(i - first)])));
+    }
+    return {};
+}
+
+Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job) {
+    std::vector<ViewSurface> out(bundle.views.size());
+    STX_CHECK(forEachSurface(bundle, nullptr, job,
+                             [&](std::size_t index, ViewSurface surface) -> Result<void> {
+                                 out[index] = std::move(surface);
+                                 return {};
+                             }));
     return out;
 }
 
