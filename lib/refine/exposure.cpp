@@ -40,11 +40,6 @@ class Samples {
         for (const Camera& c : cameras) cameraFromWorld_.push_back(c.cameraFromWorld());
     }
 
-    struct ColourPoint {
-        glm::dvec3 world;
-        glm::dvec3 normal;  ///< of the surface; of single pixels: towards their camera
-        glm::vec3 colour;
-    };
     [[nodiscard]] std::vector<ColourPoint> pointsOf(std::size_t view) const {
         const Camera& c = cameras_[view];
         const double pixels = static_cast<double>(c.width) * c.height;
@@ -161,18 +156,20 @@ class SharedColoursFinder {
     /// `keeps`: views are read for each look. Then colours are kept when it is found who shows the
     /// same, so that views need not be looked at again.
     SharedColoursFinder(std::span<const Camera> cameras, const PartOfView& partOf,
-                        const EachView& each, int radius, bool keeps)
+                        const EachView& each, int radius, bool keeps,
+                        const ColourPoints* known = nullptr)
         : cameras_(cameras),
           each_(each),
           keeps_(keeps),
+          known_(known != nullptr),
           samples_(cameras, partOf, radius),
-          points_(cameras.size()),
+          points_(known ? *known : ColourPoints(cameras.size())),
           shown_(cameras.size(), std::vector<std::uint16_t>(cameras.size())),
           colours_(cameras.size()),
           dropped_(cameras.size()) {}
 
     Result<std::vector<SharedColours>> find() {
-        STX_CHECK(each_([&](std::size_t v) { points_[v] = samples_.pointsOf(v); }));
+        if (!known_) STX_CHECK(each_([&](std::size_t v) { points_[v] = samples_.pointsOf(v); }));
         // How much of each view another shows.
         STX_CHECK(each_([&](std::size_t at) {
             for (std::size_t v = 0; v < points_.size(); ++v)
@@ -191,7 +188,7 @@ class SharedColoursFinder {
     }
 
   private:
-    using Points = std::vector<Samples::ColourPoint>;
+    using Points = std::vector<ColourPoint>;
 
     /// Every so many of a view's points rank who shows it, from half as many on.
     [[nodiscard]] static std::size_t rankStep(const Points& points) {
@@ -224,7 +221,7 @@ class SharedColoursFinder {
         const Camera& c = cameras_[at];
         if (c.orthographic) return false;
         std::array<bool, 5> beyond{true, true, true, true, true};
-        for (const Samples::ColourPoint& point : points) {
+        for (const ColourPoint& point : points) {
             const glm::dvec3 p = glm::conjugate(c.orientation) * (point.world - c.position);
             const double w = -p.z, x = c.fx * p.x + c.cx * w, y = -c.fy * p.y + c.cy * w;
             const double inside[] = {w, x + w, (c.width + 1) * w - x, y + w,
@@ -262,9 +259,9 @@ class SharedColoursFinder {
 
     std::span<const Camera> cameras_;
     const EachView& each_;
-    bool keeps_;
+    bool keeps_, known_;
     Samples samples_;
-    std::vector<Points> points_;                     ///< of each view
+    ColourPoints points_;                            ///< of each view
     std::vector<std::vector<std::uint16_t>> shown_;  ///< by `at` and view: of those that rank
     std::vector<std::map<std::size_t, ColoursAt>> colours_;  ///< the same: all that were found
     std::vector<std::set<std::size_t>> dropped_;  ///< the same: what was too much to keep
@@ -272,8 +269,8 @@ class SharedColoursFinder {
 };
 
 Result<std::vector<ColourMap>> mapsOf(std::span<const Camera> cameras, const PartOfView& partOf,
-                                      const EachView& each, bool keeps) {
-    STX_TRY(auto pairs, SharedColoursFinder(cameras, partOf, each, 1, keeps).find());
+                                      const EachView& each, bool keeps, const ColourPoints* known) {
+    STX_TRY(auto pairs, SharedColoursFinder(cameras, partOf, each, 1, keeps, known).find());
     std::size_t most = 0;
     for (const SharedColours& pair : pairs) most = std::max(most, pair.points.size());
     if (most < kFewInside) {
@@ -290,12 +287,20 @@ std::vector<ColourMap> exposureMaps(std::span<const Camera> cameras, const PartO
                     [&](std::int64_t v) { body(static_cast<std::size_t>(v)); });
         return {};
     };
-    return *mapsOf(cameras, partOf, each, false);  // nothing in it fails
+    return *mapsOf(cameras, partOf, each, false, nullptr);  // nothing in it fails
 }
 
 Result<std::vector<ColourMap>> exposureMaps(std::span<const Camera> cameras,
-                                            const PartOfView& partOf, const EachView& each) {
-    return mapsOf(cameras, partOf, each, true);
+                                            const PartOfView& partOf, const EachView& each,
+                                            const ColourPoints* known) {
+    return mapsOf(cameras, partOf, each, true, known);
+}
+
+std::vector<ColourPoint> colourPointsOf(const ReferenceView& view) {
+    const PartOfView whole = [&view](std::size_t, int, int, int, int) {
+        return PixelPart{&view.texture, &view.depth, 0, 1, view.camera.width};
+    };
+    return Samples(std::span(&view.camera, 1), whole, 1).pointsOf(0);
 }
 
 void applyMap(const ColourMap& map, int x0, int y0, int x1, int y1, Texture& texture,

@@ -76,7 +76,8 @@ class SomeViews : public ViewTable {
 class PartNeeds {
   public:
     PartNeeds(const ViewTable& table, const Part& part, Job& job)
-        : views_(table, part.views),
+        : table_(table),
+          views_(table, part.views),
           part_(part),
           job_(job),
           now_(part.views.size()),
@@ -99,7 +100,11 @@ class PartNeeds {
             if (isKnown()) return fail(ErrorCode::failed, "depth is refined");
             return each(body);
         };
-        auto maps = exposureMaps(cameras, partOf, eachView);
+        ColourPoints known;
+        if (const auto* looked = dynamic_cast<const ViewsLookedAt*>(&table_);
+            looked && looked->colourPoints())
+            for (const std::size_t i : part_.views) known.push_back((*looked->colourPoints())[i]);
+        auto maps = exposureMaps(cameras, partOf, eachView, known.empty() ? nullptr : &known);
         if (isKnown()) return true;
         if (!maps) return propagate(maps);
         return !std::ranges::all_of(*maps, &ColourMap::changesNothing);
@@ -123,6 +128,7 @@ class PartNeeds {
         return {};
     }
 
+    const ViewTable& table_;
     const SomeViews views_;
     const Part& part_;
     Job& job_;

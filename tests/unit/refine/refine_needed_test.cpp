@@ -2,6 +2,7 @@
 // when all are there.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 
 #include "lib/refine/refine_needed.hpp"
@@ -37,6 +38,18 @@ class CopiedViews : public ViewTable {
     const Bundle& bundle_;
 };
 
+/// The same, by who has looked at them before.
+class ViewsSeen : public CopiedViews, public ViewsLookedAt {
+  public:
+    ViewsSeen(const Bundle& bundle, Bundle headers) : CopiedViews(bundle, std::move(headers)) {
+        for (const ReferenceView& view : bundle.views) points_.push_back(colourPointsOf(view));
+    }
+    const ColourPoints* colourPoints() const override { return &points_; }
+
+  private:
+    ColourPoints points_;
+};
+
 /// `asked`: of each view, at most.
 void expectNeeds(const Bundle& bundle, const RefineSettings& settings, bool needed, int asked) {
     Bundle headers;
@@ -48,6 +61,14 @@ void expectNeeds(const Bundle& bundle, const RefineSettings& settings, bool need
     ASSERT_TRUE(may) << may.error().text();
     EXPECT_EQ(*may, needed);
     EXPECT_LE(table.asked, asked * static_cast<int>(bundle.views.size()));
+    const ViewsSeen seen(bundle, headers);
+    const auto found = mayRefine(seen, settings, job);
+    ASSERT_TRUE(found) << found.error().text();
+    EXPECT_EQ(*found, needed);
+    // Where views are looked at twice, one look is spared; colours behind are not looked at.
+    const auto views = static_cast<int>(bundle.views.size());
+    const auto inFront = std::ranges::count(bundle.views, false, &ReferenceView::background);
+    EXPECT_LE(seen.asked, table.asked > views ? table.asked - inFront : views);
     Bundle refined = bundle;
     const auto report = refine(refined, settings, job);
     ASSERT_TRUE(report);
@@ -69,6 +90,7 @@ TEST(RefineNeeded, NotOfExactViews) {
 TEST(RefineNeeded, ReadsWhatIsBehindByItself) {
     Bundle torus = torusViews(96);
     torus.views[3].background = torus.views[7].background = true;
+    expectNeeds(torus, {}, false, 2);
     RefineSettings without;
     without.set(RefineStep::exposure, false);
     expectNeeds(torus, without, false, 1);
