@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "lib/model/some_views.hpp"
 #include "lib/refine/exposure.hpp"
 #include "lib/refine/refine_depth.hpp"
 
@@ -31,53 +32,12 @@ bool tellsSideBySide(const ViewTable& table, const Part& part) {
             std::ranges::all_of(part.views, captured));
 }
 
-/// Some views of a table: the others are not read.
-class SomeViews : public ViewTable {
-  public:
-    SomeViews(const ViewTable& all, const std::vector<std::size_t>& numbers)
-        : ViewTable(headersOf(all, numbers), kindsOf(all, numbers),
-                    all.planesKnown() ? Planes::known : Planes::withPixels),
-          all_(all),
-          numbers_(numbers) {}
-
-    std::uint64_t bytesHeld() const override { return all_.bytesHeld(); }
-    std::uint64_t bytesGiven(std::size_t index) const override {
-        return all_.bytesGiven(numbers_[index]);
-    }
-    std::uint64_t bytesToMake(std::size_t index) const override {
-        return all_.bytesToMake(numbers_[index]);
-    }
-    int mostAtOnce() const override { return all_.mostAtOnce(); }
-
-  protected:
-    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
-        return all_.view(numbers_[index], job);
-    }
-
-  private:
-    static Bundle headersOf(const ViewTable& all, const std::vector<std::size_t>& numbers) {
-        Bundle headers;
-        for (const std::size_t i : numbers)
-            static_cast<ViewHeader&>(headers.views.emplace_back()) = all.about().views[i];
-        return headers;
-    }
-    static std::vector<ViewImageKinds> kindsOf(const ViewTable& all,
-                                               const std::vector<std::size_t>& numbers) {
-        std::vector<ViewImageKinds> kinds;
-        for (const std::size_t i : numbers) kinds.push_back(all.kindsOf(i));
-        return kinds;
-    }
-
-    const ViewTable& all_;
-    const std::vector<std::size_t>& numbers_;
-};
-
 /// The same as what matchExposure() and refineDepth() find in memory.
 class PartNeeds {
   public:
     PartNeeds(const ViewTable& table, const Part& part, Job& job)
         : table_(table),
-          views_(table, part.views),
+          views_(someViewsOf(table, part.views)),
           part_(part),
           job_(job),
           now_(part.views.size()),
@@ -89,7 +49,7 @@ class PartNeeds {
             return depth_.any();
         }
         std::vector<Camera> cameras;
-        for (const ViewHeader& view : views_.about().views) cameras.push_back(view.camera);
+        for (const ViewHeader& view : views_->about().views) cameras.push_back(view.camera);
         const auto partOf = [&](std::size_t k, int, int, int, int) {
             const ReferenceView& view = *now_[k];
             return PixelPart{&view.texture, &view.depth, 0, 1, view.camera.width};
@@ -115,7 +75,7 @@ class PartNeeds {
     Result<void> each(const std::function<void(std::size_t)>& body) {
         std::vector<RefineNeeds> needs(now_.size(), RefineNeeds(part_.left));
         STX_CHECK(forEachView(
-            views_, peak::kRefine, job_,
+            *views_, peak::kRefine, job_,
             [&](std::size_t k, std::shared_ptr<const ReferenceView> view) -> Result<void> {
                 if (!depthDone_) needs[k].add(RefineView{view.get(), &view->texture, &view->depth});
                 now_[k] = std::move(view);
@@ -129,7 +89,7 @@ class PartNeeds {
     }
 
     const ViewTable& table_;
-    const SomeViews views_;
+    const std::unique_ptr<const ViewTable> views_;
     const Part& part_;
     Job& job_;
     std::vector<std::shared_ptr<const ReferenceView>> now_;
