@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "lib/render/surface/prepare/source.hpp"
 
@@ -83,6 +84,15 @@ std::array<float, ViewSummary::kCells * ViewSummary::kCells> farthestOf(const Re
 TEST(Summary, SaysOfEachCellHowFarItReaches) {
     for (const int edge : {kSlopeWidth, 101, 0})
         EXPECT_EQ(summaryOf(slope(edge)).farthest, farthestOf(slope(edge))) << edge;
+    // What is missing, or near an edge, counts for blocks up to four pixels away.
+    std::mt19937 random(7);
+    for (int round = 0; round < 40; ++round) {
+        ReferenceView view = slope();
+        const int x = static_cast<int>(random() % kSlopeWidth);
+        const int y = static_cast<int>(random() % kSlopeHeight);
+        view.depth.at(x, y) = round % 2 ? kNoDepth : 8.5f;
+        EXPECT_EQ(summaryOf(view).farthest, farthestOf(view)) << x << " " << y;
+    }
 }
 
 TEST(Summary, MayBeThatOfItsOwnView) {
