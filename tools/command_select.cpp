@@ -127,27 +127,24 @@ Result<int> select(const SelectOptions& o, const Command& command, Program& prog
     SaveOptions save;
     save.noClobber = program.common.noClobber;
     Bundle bundle;
-    Selection selection;
-    std::unique_ptr<ViewTable> table;
-    if (!timeline.moves()) {
-        STX_TRY(table, frames->views(0, program.job));
-    }
-    const bool oneByOne = table && mayGoOneByOne(*table);
-    if (oneByOne) {
-        STX_TRY(selection, selectViews(*table, settings, program.job));
+    std::unique_ptr<ViewTable> oneByOne;
+    if (timeline.moves()) {
+        STX_TRY(bundle, momentWithMost(*frames, program.job));
     } else {
-        if (table) {
-            STX_TRY(bundle, wholeBundle(std::move(table), program.job));
+        STX_TRY(auto table, frames->views(0, program.job));
+        if (mayGoOneByOne(*table)) {
+            oneByOne = std::move(table);
         } else {
-            STX_TRY(bundle, momentWithMost(*frames, program.job));
+            STX_TRY(bundle, wholeBundle(std::move(table), program.job));
         }
-        STX_TRY(selection, selectInFront(bundle, settings, program.job));
     }
-    const std::size_t of = oneByOne ? table->count() : bundle.views.size();
+    const std::size_t of = oneByOne ? oneByOne->count() : bundle.views.size();
+    STX_TRY(const Selection selection, oneByOne ? selectViews(*oneByOne, settings, program.job)
+                                                : selectInFront(bundle, settings, program.job));
     if (oneByOne) {
         std::vector<std::size_t> kept(selection.views.begin(), selection.views.end());
         std::ranges::sort(kept);
-        STX_CHECK(saveViews(*someViewsOf(*table, std::move(kept)), o.output, save, program.job));
+        STX_CHECK(saveViews(*someViewsOf(*oneByOne, std::move(kept)), o.output, save, program.job));
     } else if (timeline.moves()) {
         bundle = {};
         frames = changed(std::move(frames), [&](Bundle& frame, Job&) -> Result<void> {

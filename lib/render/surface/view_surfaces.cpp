@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <memory>
 #include <span>
 
 #include "lib/base/parallel.hpp"
@@ -424,11 +425,12 @@ Result<void> forEachSurface(
     if (!spool) STX_CHECK(checkPeak(peak::kSurfaces, bundle.views, job.limits));
     RenderSettings settings;
     settings.without.add(Stage::sharpen);
-    const SurfaceScene scene(spool ? PageSet(bundle, *spool) : PageSet(bundle), settings);
+    auto scene = std::make_unique<const SurfaceScene>(
+        spool ? PageSet(bundle, *spool) : PageSet(bundle), settings);
     STX_CHECK(job.checkCancelled());
-    Maker maker(scene);
+    auto maker = std::make_unique<Maker>(*scene);
     const auto count = static_cast<std::int64_t>(bundle.views.size());
-    parallelFor(0, count, [&](std::int64_t i) { maker.prepare(static_cast<std::size_t>(i)); });
+    parallelFor(0, count, [&](std::int64_t i) { maker->prepare(static_cast<std::size_t>(i)); });
     const std::int64_t atOnce = std::max<std::int64_t>(1, threadCount());
     for (std::int64_t first = 0; first < count; first += atOnce) {
         const std::int64_t end = std::min(first + atOnce, count);
@@ -436,9 +438,14 @@ Result<void> forEachSurface(
         parallelFor(first, end, [&](std::int64_t i) {
             if (job.cancelled) return;
             found[static_cast<std::size_t>(i - first)] =
-                maker.surfaceOf(static_cast<std::size_t>(i));
+                maker->surfaceOf(static_cast<std::size_t>(i));
         });
         STX_CHECK(job.checkCancelled());
+        if (end == count) {
+            // The last views are written without what they were made of.
+            maker.reset();
+            scene.reset();
+        }
         for (std::int64_t i = first; i < end; ++i)
             STX_CHECK(take(static_cast<std::size_t>(i),
                            std::move(found[static_cast<std::size_t>(i - first)])));
