@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <memory>
 #include <numeric>
 
 #include <nlohmann/json.hpp>
@@ -7,6 +9,7 @@
 #include "formats/any/sequences.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/stopwatch.hpp"
+#include "lib/model/some_views.hpp"
 #include "lib/selection/selection.hpp"
 #include "tools/commands.hpp"
 #include "tools/mesh_views.hpp"
@@ -96,6 +99,11 @@ Result<Selection> selectInFront(const Bundle& bundle, const SelectSettings& sett
     return selection;
 }
 
+/// Background views stay, whatever they see, and are rare: all views are in memory then.
+bool mayGoOneByOne(const ViewTable& table) {
+    return !table.whole() && std::ranges::none_of(table.about().views, &ReferenceView::background);
+}
+
 Result<int> select(const SelectOptions& o, const Command& command, Program& program) {
     const Stopwatch watch;
     STX_CHECK(checkTarget(o.output, program));
@@ -114,14 +122,30 @@ Result<int> select(const SelectOptions& o, const Command& command, Program& prog
             "'{}' has {} frames, and '{}' holds one; .mp4, .xmt, .bt and a numbered name as "
             "in name_%04d.exr hold more",
             o.input, timeline.count(), o.output);
-    STX_TRY(auto bundle, momentWithMost(*frames, program.job));
     SelectSettings settings = o.settings;
     settings.share = o.sharePercent.value_or(settings.count > 0 ? 100.0 : 95.0) / 100.0;
-    STX_TRY(const auto selection, selectInFront(bundle, settings, program.job));
     SaveOptions save;
     save.noClobber = program.common.noClobber;
-    const std::size_t of = bundle.views.size();
+    Bundle bundle;
+    std::unique_ptr<ViewTable> oneByOne;
     if (timeline.moves()) {
+        STX_TRY(bundle, momentWithMost(*frames, program.job));
+    } else {
+        STX_TRY(auto table, frames->views(0, program.job));
+        if (mayGoOneByOne(*table)) {
+            oneByOne = std::move(table);
+        } else {
+            STX_TRY(bundle, wholeBundle(std::move(table), program.job));
+        }
+    }
+    const std::size_t of = oneByOne ? oneByOne->count() : bundle.views.size();
+    STX_TRY(const Selection selection, oneByOne ? selectViews(*oneByOne, settings, program.job)
+                                                : selectInFront(bundle, settings, program.job));
+    if (oneByOne) {
+        std::vector<std::size_t> kept(selection.views.begin(), selection.views.end());
+        std::ranges::sort(kept);
+        STX_CHECK(saveViews(*someViewsOf(*oneByOne, std::move(kept)), o.output, save, program.job));
+    } else if (timeline.moves()) {
         bundle = {};
         frames = changed(std::move(frames), [&](Bundle& frame, Job&) -> Result<void> {
             frame = keepViews(std::move(frame), selection.views);

@@ -5,10 +5,12 @@
 #include "formats/any/open.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
+#include "formats/files/file_spool.hpp"
 #include "formats/viewer/surfaces_glb.hpp"
 #include "formats/viewer/viewer_page.hpp"
 #include "lib/base/stopwatch.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/refine/refine_needed.hpp"
 #include "tools/camera_options.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/refining.hpp"
@@ -50,19 +52,60 @@ Result<Shown> writePage(const std::string& input, const OpenOptions& open,
                  page->views, page->points};
 }
 
+/// The part of the memory limit that holds what is in use of a spool; see also render_scene.cpp.
+constexpr std::uint64_t kSpoolPart = 32;
+/// Of the surfaces of a view that is made from a spool, and of each pixel of all views what is
+/// known of its block and whether it is a corner, bytes.
+constexpr PeakMemory kSurfacesOfOne = {
+    peak::kSurfaces.what, peak::kSurfaces.perPixel + peak::kSurfaces.perPixelOfLargest};
+constexpr std::uint64_t kKnownOfSurfaces = 3;
+
+/// The views of a model, refined. Where they would take more memory than there may be, and nothing
+/// of them is to refine, they are in a spool, which is made then.
+Result<Bundle> viewsOfModel(std::unique_ptr<ViewTable> table, const RefineSettings& settings,
+                            const SurfacesOptions& options, const std::filesystem::path& output,
+                            std::unique_ptr<FileSpool>& spool, Job& job) {
+    const bool fewer = options.mostTriangles > 0;
+    const PeakMemory& takes = fewer ? peak::kFewerTriangles : peak::kSurfaces;
+    const std::uint64_t limit = job.limits.maxMemoryBytes;
+    const std::uint64_t inMemory = memoryOfAll(*table, takes);
+    if (!fewer && !table->whole() && inMemory > limit) {
+        std::uint64_t pixels = 0;
+        for (std::size_t i = 0; i < table->count(); ++i) pixels += table->pixelsOf(i);
+        const std::uint64_t beside =
+            memoryOfEach(*table, kSurfacesOfOne) + kKnownOfSurfaces * pixels;
+        const std::uint64_t fromSpool = beside + beside / (kSpoolPart - 1);
+        bool needed = true;
+        if (fromSpool <= limit) {
+            STX_TRY(needed, mayRefine(*table, settings, job));
+        }
+        if (!needed) {
+            STX_TRY(spool, FileSpool::create(folderOf(output), limit / kSpoolPart));
+            return wholeBundle(*table, *spool, job);
+        }
+    }
+    STX_TRY(auto bundle, wholeBundle(std::move(table), job));
+    STX_CHECK(refineViews(bundle, settings, takes, job));
+    return bundle;
+}
+
 /// A model of one moment.
 Result<Shown> writeModel(const std::string& input, const OpenOptions& open,
                          const std::string& output, const std::optional<double>& time,
                          const std::string& refine, const SurfacesOptions& options,
                          Program& program) {
+    STX_TRY(const auto settings, refineSettings(refine));
     STX_TRY(auto frames, openSequence(input, open, program.job));
-    STX_TRY(frames, refined(std::move(frames), refine,
-                            options.mostTriangles > 0 ? peak::kFewerTriangles : peak::kSurfaces));
     STX_TRY(const auto moment,
             momentOf(time, frames->timeline(), "a model is", input, program.job));
-    STX_TRY(auto bundle, frames->frame(moment, program.job));
+    STX_TRY(auto table, frames->views(moment, program.job));
+    std::unique_ptr<FileSpool> spool;  // outlives its bundle
+    STX_TRY(auto bundle,
+            viewsOfModel(std::move(table), settings, options, output, spool, program.job));
     Shown out{"", bundle.views.size(), bundle.pointCount()};
-    STX_TRY(const auto report, writeSurfaces(output, std::move(bundle), options, program.job));
+    SurfacesOptions write = options;
+    write.spool = spool.get();
+    STX_TRY(const auto report, writeSurfaces(output, std::move(bundle), write, program.job));
     out.what = counted(report.views, "view") + ", " +
                counted(static_cast<std::size_t>(report.triangles), "triangle");
     if (report.points > 0)

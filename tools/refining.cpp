@@ -25,6 +25,12 @@ Result<void> checkNoImport(const RefineSettings& settings) {
     return {};
 }
 
+/// Of refining, and of what follows.
+PeakMemory mostOf(const PeakMemory& then) {
+    const bool thenMore = then.perPixel + then.perPixelOfLargest > peak::kRefine.perPixel;
+    return thenMore ? then : peak::kRefine;
+}
+
 /// checkPeak() of all views of a table in memory.
 Result<void> checkPeakOfAll(const PeakMemory& step, const ViewTable& views, const Limits& limits) {
     std::uint64_t pixels = 0, largest = 0, held = 0;
@@ -57,19 +63,24 @@ Result<RefineSettings> refineSettings(const std::string& text) {
     return settings;
 }
 
+Result<void> refineViews(Bundle& bundle, const RefineSettings& settings, const PeakMemory& then,
+                         Job& job) {
+    if (!settings.any()) return {};
+    // Before the work, and not after it.
+    STX_CHECK(checkPeak(mostOf(then), bundle.views, job.limits));
+    STX_TRY(const auto report, stx::refine(bundle, settings, job));
+    if (report.changed()) job.note(report.note());
+    return {};
+}
+
 Result<std::unique_ptr<Sequence>> refined(std::unique_ptr<Sequence> frames, const std::string& text,
                                           const PeakMemory& then,
                                           const std::filesystem::path& keepIn) {
     STX_TRY(const auto settings, refineSettings(text));
     if (!settings.any()) return frames;
-    const bool thenMore = then.perPixel + then.perPixelOfLargest > peak::kRefine.perPixel;
-    const PeakMemory most = thenMore ? then : peak::kRefine;
-    const auto refine = [settings, most](Bundle& bundle, Job& job) -> Result<void> {
-        // Before the work, and not after it.
-        STX_CHECK(checkPeak(most, bundle.views, job.limits));
-        STX_TRY(const auto report, stx::refine(bundle, settings, job));
-        if (report.changed()) job.note(report.note());
-        return {};
+    const PeakMemory most = mostOf(then);
+    const auto refine = [settings, then](Bundle& bundle, Job& job) -> Result<void> {
+        return refineViews(bundle, settings, then, job);
     };
     const auto needed = [settings, most](const ViewTable& views, Job& job) -> Result<bool> {
         auto found = mayRefine(views, settings, job);

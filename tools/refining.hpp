@@ -21,6 +21,10 @@ Option refineOption(Command& command, std::string& text);
 /// can do.
 [[nodiscard]] Result<RefineSettings> refineSettings(const std::string& text);
 
+/// Refines views that are there; a note says which steps were done. `then`: as below.
+[[nodiscard]] Result<void> refineViews(Bundle& bundle, const RefineSettings& settings,
+                                       const PeakMemory& then, Job& job);
+
 /// Frames that are refined when they are read; a note says which steps were done. `text` is that of
 /// the option. `then` is what they are for: errors (invalidInput) where they are too large for it.
 /// `keepIn`: of frames that are read more than once, a folder for what became of them.

@@ -211,7 +211,7 @@ Result<void> makeStill(const RenderOptions& o, const RenderSettings& asked,
         const auto wanted =
             neededViews(o.backend, o.device, headers, scene.summaries, settings, cameras);
         const auto check = [&](std::size_t index, const ReferenceView& view) -> Result<void> {
-            if (summaryOfView(view) == scene.summaries[index]) return {};
+            if (mayBeSummaryOf(scene.summaries[index], view)) return {};
             return failAt(fmt::format("{}: view {}", scene.table->where(), index),
                           ErrorCode::invalidInput,
                           "its summary is not that of its pixels: the file is damaged; write it "

@@ -39,7 +39,7 @@ constexpr ViewCommand kCommands[] = {
     {"render --light", &peak::kLitSurfaceMode, &peak::kLitSurfaceMode, atAll},
     {"render --mode splat --light", &peak::kLitSplatMode, &peak::kLitSplatMode, atAll},
     {"pack", &peak::kAtlas, &peak::kAtlas, whilePacked},
-    {"select", &peak::kSelect, &peak::kSelect, atAll},
+    {"select", &peak::kSelect, &peak::kSelect, atEach},
     {"refine", &peak::kRefine, &peak::kRefine, atAll},
     {"extract -o NAME.ply", &peak::kPoints, &peak::kPoints, atRefined},
     {"extract -o NAME.ply --as splats", &peak::kSplats, &peak::kSplats, atAll},

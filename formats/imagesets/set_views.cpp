@@ -9,6 +9,7 @@
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/read_views.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/refine/refine_needed.hpp"
 #include "lib/registration/disagreement_by_view.hpp"
 
 namespace stx::imagesets {
@@ -49,10 +50,11 @@ struct Looked {
     bool linear = false;         ///< some picture holds linear light: all are to
     glm::dvec3 subtracted{0.0};  ///< from the cameras' places; see findOrigin()
     std::unique_ptr<DisagreementByView> disagreement;
+    ColourPoints points;  ///< of what is given; empty where that is not what was looked at
 };
 
 /// A set whose views are read again whenever they are asked for.
-class SetViews : public ViewTable {
+class SetViews : public ViewTable, public ViewsLookedAt {
   public:
     SetViews(Bundle headers, SetDescription set, std::string where, ImageSetOptions options,
              Looked looked)
@@ -66,6 +68,9 @@ class SetViews : public ViewTable {
         return 2 * bytesOf(index) + kReadingTakes * pixelsOf(index);
     }
     std::string where() const override { return where_; }
+    const ColourPoints* colourPoints() const override {
+        return looked_.points.empty() ? nullptr : &looked_.points;
+    }
 
   protected:
     Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
@@ -150,6 +155,7 @@ Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::s
     headers.views.resize(count);
     Looked looked;
     looked.kinds.resize(count);
+    looked.points.resize(count);
     looked.disagreement = std::make_unique<DisagreementByView>(count);
     for (const SetView& view : set.views) looked.files.emplace_back(view);
     std::vector<Bounds> bounds(count);
@@ -162,6 +168,7 @@ Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::s
         looked.kinds[i] = ViewImageKinds::of(view);
         bounds[i] = view.computeBounds();
         looked.disagreement->sample(i, view.depth);
+        looked.points[i] = colourPointsOf(view);
         return {};
     };
     STX_TRY(const std::size_t atOnce, within(where, viewsAtOnce(set, job.limits)));
@@ -179,6 +186,7 @@ Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::s
         headers.bounds->add(one.max);
     }
     looked.subtracted = findOrigin(headers, set, job);
+    if (looked.linear || looked.subtracted != glm::dvec3(0.0)) looked.points.clear();
     if (options.refined) options.refined(report);
     return std::make_unique<SetViews>(std::move(headers), std::move(set), where, options,
                                       std::move(looked));

@@ -170,12 +170,15 @@ Json pageCamera(const Camera& c, const std::string& name) {
     return j;
 }
 
-void codeColours(Bundle& bundle, std::string_view what, Job& job) {
+void codeColours(Bundle& bundle, std::string_view what, Job& job, PixelSpool* spool) {
     const bool linear = std::ranges::any_of(
         bundle.views, [](const ReferenceView& v) { return v.texture.isLinear(); });
     if (linear) job.note(fmt::format("colours of linear light become 8-bit sRGB in {}", what));
     for (auto& view : bundle.views) {
-        if (const auto* floats = view.texture.rgbaFloat()) view.texture = coded(*floats);
+        const auto* floats = view.texture.rgbaFloat();
+        if (!floats) continue;
+        view.texture = coded(*floats);
+        view.texture.moveTo(spool);
     }
 }
 

@@ -34,8 +34,9 @@ struct PageScene {
     std::vector<std::size_t> owners;  ///< of each page: the number of the atlas that it is of
 };
 
-/// A bundle with 8-bit sRGB colour, which `what` ("the page") has. What is lossy is noted.
-void codeColours(Bundle& bundle, std::string_view what, Job& job);
+/// A bundle with 8-bit sRGB colour, which `what` ("the page") has. What is lossy is noted. `spool`,
+/// if any, is that of the bundle.
+void codeColours(Bundle& bundle, std::string_view what, Job& job, PixelSpool* spool = nullptr);
 /// A bundle with 8-bit sRGB colour and depth of 8 or 16 bits, as the viewer's textures hold them.
 /// What is lossy is noted.
 void makeViewable(Bundle& bundle, Job& job);

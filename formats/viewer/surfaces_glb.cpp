@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <unordered_map>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -34,10 +35,10 @@ ByteSpan bytesOfList(const std::vector<T>& list) {
     return std::as_bytes(std::span(list));
 }
 
-/// The file as it grows.
+/// The file as it grows. `spool`: where its bytes are until they are written; null: in memory.
 class Model {
   public:
-    Model() {
+    explicit Model(PixelSpool* spool) : spool_(spool) {
         root_["asset"] = {{"version", "2.0"}, {"generator", "stx"}};
         root_["scene"] = 0;
         root_["scenes"] = Json::array({Json::object()});
@@ -54,10 +55,12 @@ class Model {
 
     /// Bytes at a multiple of four, as a new buffer view. `target` 0: of an image.
     std::size_t addBytes(ByteSpan bytes, int target) {
-        binary_.resize((binary_.size() + 3) / 4 * 4);
-        Json view{{"buffer", 0}, {"byteOffset", binary_.size()}, {"byteLength", bytes.size()}};
+        Json view{{"buffer", 0}, {"byteOffset", size_}, {"byteLength", bytes.size()}};
         if (target != 0) view["target"] = target;
-        binary_.insert(binary_.end(), bytes.begin(), bytes.end());
+        Pixels<std::byte> piece((bytes.size() + 3) / 4 * 4, {}, spool_);
+        std::ranges::copy(bytes, piece.data());
+        size_ += piece.size();
+        pieces_.push_back(std::move(piece));
         return add("bufferViews", std::move(view));
     }
     std::size_t addNumbers(ByteSpan bytes, std::size_t count, const char* type, int component,
@@ -101,14 +104,13 @@ class Model {
     }
 
     Result<void> write(const std::filesystem::path& path, OutputFile::Options options) {
-        binary_.resize((binary_.size() + 3) / 4 * 4);
-        root_["buffers"] = Json::array({{{"byteLength", binary_.size()}}});
+        root_["buffers"] = Json::array({{{"byteLength", size_}}});
         // Lists that glTF does not take empty.
         for (const char* name : {"textures", "images", "samplers", "materials"})
             if (root_[name].empty()) root_.erase(name);
         std::string text = root_.dump(-1, ' ', false, Json::error_handler_t::replace);
         text.resize((text.size() + 3) / 4 * 4, ' ');
-        const std::uint64_t size = 28ull + text.size() + binary_.size();
+        const std::uint64_t size = 28ull + text.size() + size_;
         if (size > std::numeric_limits<std::uint32_t>::max())
             return fail(ErrorCode::failed,
                         "the model has {} bytes; a GLB file holds less than 2^32 (smaller or fewer "
@@ -122,14 +124,19 @@ class Model {
         };
         STX_CHECK(file.write(bytesOfList(words({kMagic, 2, size, text.size(), kJsonChunk}))));
         STX_CHECK(file.write(text));
-        STX_CHECK(file.write(bytesOfList(words({binary_.size(), kBinaryChunk}))));
-        STX_CHECK(file.write(bytesOfList(binary_)));
+        STX_CHECK(file.write(bytesOfList(words({size_, kBinaryChunk}))));
+        for (Pixels<std::byte>& piece : pieces_) {
+            STX_CHECK(file.write(ByteSpan(piece.data(), piece.size())));
+            piece = {};
+        }
         return file.commit();
     }
 
   private:
     Json root_;
-    Bytes binary_;
+    PixelSpool* spool_;
+    std::vector<Pixels<std::byte>> pieces_;  ///< each a multiple of four bytes
+    std::uint64_t size_ = 0;                 ///< of all
 };
 
 /// A colour's part of 8 bits as 16 bits of linear light, as COLOR_0 has it.
@@ -212,8 +219,8 @@ Result<void> checkPlaces(const ReferenceView& view, const std::vector<glm::vec3>
 
 class Writer {
   public:
-    Writer(const Bundle& bundle, int jpegQuality, Job& job)
-        : bundle_(bundle), jpegQuality_(jpegQuality), job_(job) {
+    Writer(const Bundle& bundle, const SurfacesOptions& options, Job& job)
+        : bundle_(bundle), jpegQuality_(options.jpegQuality), job_(job), model_(options.spool) {
         lit_ = std::ranges::all_of(bundle.views,
                                    [](const ReferenceView& v) { return v.hasNormals(); });
     }
@@ -390,29 +397,38 @@ Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle b
                                      const SurfacesOptions& options, Job& job) {
     bundle.noteMaterialLeftOut(job);
     noteEnvironmentLeftOut(bundle.environment, job);
-    codeColours(bundle, "the model", job);
-    if (options.mostTriangles > 0)
-        STX_CHECK(checkPeak(peak::kFewerTriangles, bundle.views, job.limits));
-    STX_TRY(auto surfaces, viewSurfaces(bundle, job));
-    for (std::size_t i = 0; i < surfaces.size(); ++i) {
-        STX_CHECK(checkPlaces(bundle.views[i], surfaces[i].positions));
-        STX_CHECK(checkPlaces(bundle.views[i], surfaces[i].lonePositions));
-    }
-    if (options.mostTriangles > 0) {
-        std::uint64_t triangles = 0;
-        for (const ViewSurface& s : surfaces) triangles += s.triangles.size() / 3;
-        STX_CHECK(checkPeakOfTriangles(triangles, bundle.views, job.limits));
-        STX_CHECK(takeFewerTriangles(bundle, options.mostTriangles, surfaces, job));
-    }
-    Writer writer(bundle, options.jpegQuality, job);
-    writer.report.views = bundle.views.size();
-    for (std::size_t i = 0; i < surfaces.size(); ++i) {
-        job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(surfaces.size()),
+    codeColours(bundle, "the model", job, options.spool);
+    const std::size_t count = bundle.views.size();
+    Writer writer(bundle, options, job);
+    writer.report.views = count;
+    const auto checkSurface = [&](std::size_t i, const ViewSurface& surface) -> Result<void> {
+        STX_CHECK(checkPlaces(bundle.views[i], surface.positions));
+        return checkPlaces(bundle.views[i], surface.lonePositions);
+    };
+    const auto add = [&](std::size_t i, const ViewSurface& surface) -> Result<void> {
+        job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(count),
                      "writing views");
         STX_CHECK(job.checkCancelled());
-        STX_CHECK(writer.add(bundle.views[i], surfaces[i]));
-        surfaces[i] = {};
+        return writer.add(bundle.views[i], surface);
+    };
+    if (options.mostTriangles == 0) {
+        const auto take = [&](std::size_t i, const ViewSurface& surface) -> Result<void> {
+            STX_CHECK(checkSurface(i, surface));
+            return add(i, surface);
+        };
+        STX_CHECK(forEachSurface(bundle, options.spool, job, take));
+        return writer.write(path, options.output);
     }
+    STX_CHECK(checkPeak(peak::kFewerTriangles, bundle.views, job.limits));
+    STX_TRY(auto surfaces, viewSurfaces(bundle, job));
+    std::uint64_t triangles = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        STX_CHECK(checkSurface(i, surfaces[i]));
+        triangles += surfaces[i].triangles.size() / 3;
+    }
+    STX_CHECK(checkPeakOfTriangles(triangles, bundle.views, job.limits));
+    STX_CHECK(takeFewerTriangles(bundle, options.mostTriangles, surfaces, job));
+    for (std::size_t i = 0; i < count; ++i) STX_CHECK(add(i, std::exchange(surfaces[i], {})));
     return writer.write(path, options.output);
 }
 

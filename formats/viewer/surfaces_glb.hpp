@@ -14,6 +14,9 @@ struct SurfacesOptions {
     std::size_t mostTriangles = 0;  ///< as takeFewerTriangles(); 0: all
     int jpegQuality = 0;            ///< of textures: 0 = PNG, exact; 1..100 = JPEG
     OutputFile::Options output = {};
+    /// Where the bundle's pixels are, if not in memory. Then what is made of them is kept there,
+    /// and no limit is checked, but of fewer triangles, which take memory for all views.
+    PixelSpool* spool = nullptr;
 };
 
 /// What a model of surfaces holds.

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -37,11 +40,6 @@ class Samples {
         for (const Camera& c : cameras) cameraFromWorld_.push_back(c.cameraFromWorld());
     }
 
-    struct ColourPoint {
-        glm::dvec3 world;
-        glm::dvec3 normal;  ///< of the surface; of single pixels: towards their camera
-        glm::vec3 colour;
-    };
     [[nodiscard]] std::vector<ColourPoint> pointsOf(std::size_t view) const {
         const Camera& c = cameras_[view];
         const double pixels = static_cast<double>(c.width) * c.height;
@@ -144,48 +142,141 @@ std::vector<SharedColours> pairsThatShare(const std::vector<std::vector<std::uin
     return pairs;
 }
 
+/// What a view shows at a point of another.
+struct ColourAt {
+    std::uint32_t point = 0;  ///< its number
+    glm::vec3 colour;
+};
+/// By the points' numbers, ascending.
+using ColoursAt = std::vector<ColourAt>;
+
 /// Pairs of views that show the same, and their colours there. Looks at each view alone.
-Result<std::vector<SharedColours>> sharedColours(std::span<const Camera> cameras,
-                                                 const PartOfView& partOf, const EachView& each,
-                                                 int radius) {
-    const std::size_t views = cameras.size();
-    const Samples samples(cameras, partOf, radius);
-    std::vector<std::vector<Samples::ColourPoint>> points(views);
-    STX_CHECK(each([&](std::size_t v) { points[v] = samples.pointsOf(v); }));
-    // How much of each view another shows.
-    std::vector<std::vector<std::uint16_t>> shown(views, std::vector<std::uint16_t>(views));
-    STX_CHECK(each([&](std::size_t at) {
-        for (std::size_t v = 0; v < views; ++v) {
-            const auto step = static_cast<std::size_t>(
-                std::max(1.0, static_cast<double>(points[v].size()) / kRankPoints));
-            for (std::size_t k = step / 2; v != at && k < points[v].size(); k += step)
-                shown[at][v] += samples.shownAt(at, points[v][k]) ? 1 : 0;
+class SharedColoursFinder {
+  public:
+    /// `keeps`: views are read for each look. Then colours are kept when it is found who shows the
+    /// same, so that views need not be looked at again.
+    SharedColoursFinder(std::span<const Camera> cameras, const PartOfView& partOf,
+                        const EachView& each, int radius, bool keeps,
+                        const ColourPoints* known = nullptr)
+        : cameras_(cameras),
+          each_(each),
+          keeps_(keeps),
+          known_(known != nullptr),
+          samples_(cameras, partOf, radius),
+          points_(known ? *known : ColourPoints(cameras.size())),
+          shown_(cameras.size(), std::vector<std::uint16_t>(cameras.size())),
+          colours_(cameras.size()),
+          dropped_(cameras.size()) {}
+
+    Result<std::vector<SharedColours>> find() {
+        if (!known_) STX_CHECK(each_([&](std::size_t v) { points_[v] = samples_.pointsOf(v); }));
+        // How much of each view another shows.
+        STX_CHECK(each_([&](std::size_t at) {
+            for (std::size_t v = 0; v < points_.size(); ++v)
+                if (v != at) keeps_ ? rankAndKeep(at, v) : rank(at, v);
+        }));
+        auto pairs = pairsThatShare(shown_);
+        STX_CHECK(findMissing(pairs));
+        // Both ways: what is shown at a point is a little blurred beside the point's own colour.
+        for (SharedColours& pair : pairs) {
+            for (const ColourAt& b : colours_[pair.b][pair.a])
+                pair.points.push_back({points_[pair.a][b.point].colour, b.colour});
+            for (const ColourAt& a : colours_[pair.a][pair.b])
+                pair.points.push_back({a.colour, points_[pair.b][a.point].colour});
         }
-    }));
-    auto pairs = pairsThatShare(shown);
-    // Both ways: what is shown at a point is a little blurred beside the point's own colour.
-    using Colours = std::vector<std::optional<glm::vec3>>;
-    std::vector<Colours> atB(pairs.size()), atA(pairs.size());
-    STX_CHECK(each([&](std::size_t at) {
-        const auto coloursOf = [&](std::size_t v) {
-            Colours colours;
-            for (const Samples::ColourPoint& p : points[v])
-                colours.push_back(samples.shownAt(at, p));
-            return colours;
-        };
-        for (std::size_t i = 0; i < pairs.size(); ++i) {
-            if (pairs[i].b == at) atB[i] = coloursOf(pairs[i].a);
-            if (pairs[i].a == at) atA[i] = coloursOf(pairs[i].b);
-        }
-    }));
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-        SharedColours& pair = pairs[i];
-        for (std::size_t k = 0; k < atB[i].size(); ++k)
-            if (const auto& b = atB[i][k]) pair.points.push_back({points[pair.a][k].colour, *b});
-        for (std::size_t k = 0; k < atA[i].size(); ++k)
-            if (const auto& a = atA[i][k]) pair.points.push_back({*a, points[pair.b][k].colour});
+        return pairs;
     }
-    return pairs;
+
+  private:
+    using Points = std::vector<ColourPoint>;
+
+    /// Every so many of a view's points rank who shows it, from half as many on.
+    [[nodiscard]] static std::size_t rankStep(const Points& points) {
+        return static_cast<std::size_t>(
+            std::max(1.0, static_cast<double>(points.size()) / kRankPoints));
+    }
+    void rank(std::size_t at, std::size_t v) {
+        const std::size_t step = rankStep(points_[v]);
+        for (std::size_t k = step / 2; k < points_[v].size(); k += step)
+            shown_[at][v] += samples_.shownAt(at, points_[v][k]) ? 1 : 0;
+    }
+    void rankAndKeep(std::size_t at, std::size_t v) {
+        if (isBeside(at, points_[v])) return;
+        ColoursAt found = coloursOf(v, at);
+        const std::size_t step = rankStep(points_[v]);
+        for (const ColourAt& c : found) shown_[at][v] += c.point % step == step / 2 ? 1 : 0;
+        if (found.empty()) return;
+        const auto bytes = static_cast<std::int64_t>(found.size() * sizeof(ColourAt));
+        if (keptBytes_.fetch_add(bytes) + bytes > kKeptBytes) {
+            keptBytes_ -= bytes;
+            dropped_[at].insert(v);
+            return;
+        }
+        found.shrink_to_fit();
+        colours_[at][v] = std::move(found);
+    }
+    /// No point of a view can be in the picture of another: all are beyond one of its sides by a
+    /// pixel or more, or behind it.
+    [[nodiscard]] bool isBeside(std::size_t at, const Points& points) const {
+        const Camera& c = cameras_[at];
+        if (c.orthographic) return false;
+        std::array<bool, 5> beyond{true, true, true, true, true};
+        for (const ColourPoint& point : points) {
+            const glm::dvec3 p = glm::conjugate(c.orientation) * (point.world - c.position);
+            const double w = -p.z, x = c.fx * p.x + c.cx * w, y = -c.fy * p.y + c.cy * w;
+            const double inside[] = {w, x + w, (c.width + 1) * w - x, y + w,
+                                     (c.height + 1) * w - y};
+            for (std::size_t k = 0; k < beyond.size(); ++k) beyond[k] = beyond[k] && inside[k] < 0;
+        }
+        return std::ranges::any_of(beyond, [](bool all) { return all; });
+    }
+    [[nodiscard]] ColoursAt coloursOf(std::size_t v, std::size_t at) const {
+        ColoursAt found;
+        for (std::size_t k = 0; k < points_[v].size(); ++k)
+            if (const auto colour = samples_.shownAt(at, points_[v][k]))
+                found.push_back({static_cast<std::uint32_t>(k), *colour});
+        return found;
+    }
+    /// Looks for those of the pairs that were not kept.
+    Result<void> findMissing(const std::vector<SharedColours>& pairs) {
+        std::vector<std::vector<std::size_t>> missing(points_.size());
+        bool any = false;
+        for (const SharedColours& pair : pairs) {
+            for (const auto& [v, at] : {std::pair(pair.a, pair.b), std::pair(pair.b, pair.a)}) {
+                if (keeps_ && !dropped_[at].contains(v)) continue;
+                missing[at].push_back(v);
+                any = true;
+            }
+        }
+        if (!any) return {};
+        return each_([&](std::size_t at) {
+            for (const std::size_t v : missing[at]) colours_[at][v] = coloursOf(v, at);
+        });
+    }
+
+    /// What is kept at most, bytes.
+    static constexpr std::int64_t kKeptBytes = 16 << 20;
+
+    std::span<const Camera> cameras_;
+    const EachView& each_;
+    bool keeps_, known_;
+    Samples samples_;
+    ColourPoints points_;                            ///< of each view
+    std::vector<std::vector<std::uint16_t>> shown_;  ///< by `at` and view: of those that rank
+    std::vector<std::map<std::size_t, ColoursAt>> colours_;  ///< the same: all that were found
+    std::vector<std::set<std::size_t>> dropped_;  ///< the same: what was too much to keep
+    std::atomic<std::int64_t> keptBytes_ = 0;
+};
+
+Result<std::vector<ColourMap>> mapsOf(std::span<const Camera> cameras, const PartOfView& partOf,
+                                      const EachView& each, bool keeps, const ColourPoints* known) {
+    STX_TRY(auto pairs, SharedColoursFinder(cameras, partOf, each, 1, keeps, known).find());
+    std::size_t most = 0;
+    for (const SharedColours& pair : pairs) most = std::max(most, pair.points.size());
+    if (most < kFewInside) {
+        STX_TRY(pairs, SharedColoursFinder(cameras, partOf, each, 0, keeps).find());
+    }
+    return matchColours(cameras.size(), pairs);
 }
 
 }  // namespace
@@ -196,18 +287,20 @@ std::vector<ColourMap> exposureMaps(std::span<const Camera> cameras, const PartO
                     [&](std::int64_t v) { body(static_cast<std::size_t>(v)); });
         return {};
     };
-    return *exposureMaps(cameras, partOf, each);  // nothing in it fails
+    return *mapsOf(cameras, partOf, each, false, nullptr);  // nothing in it fails
 }
 
 Result<std::vector<ColourMap>> exposureMaps(std::span<const Camera> cameras,
-                                            const PartOfView& partOf, const EachView& each) {
-    STX_TRY(auto pairs, sharedColours(cameras, partOf, each, 1));
-    std::size_t most = 0;
-    for (const SharedColours& pair : pairs) most = std::max(most, pair.points.size());
-    if (most < kFewInside) {
-        STX_TRY(pairs, sharedColours(cameras, partOf, each, 0));
-    }
-    return matchColours(cameras.size(), pairs);
+                                            const PartOfView& partOf, const EachView& each,
+                                            const ColourPoints* known) {
+    return mapsOf(cameras, partOf, each, true, known);
+}
+
+std::vector<ColourPoint> colourPointsOf(const ReferenceView& view) {
+    const PartOfView whole = [&view](std::size_t, int, int, int, int) {
+        return PixelPart{&view.texture, &view.depth, 0, 1, view.camera.width};
+    };
+    return Samples(std::span(&view.camera, 1), whole, 1).pointsOf(0);
 }
 
 void applyMap(const ColourMap& map, int x0, int y0, int x1, int y1, Texture& texture,

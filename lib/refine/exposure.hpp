@@ -8,6 +8,7 @@
 #include "lib/base/image.hpp"
 #include "lib/base/result.hpp"
 #include "lib/geometry/camera.hpp"
+#include "lib/model/reference_view.hpp"
 #include "lib/model/texture.hpp"
 #include "lib/refine/colour_match.hpp"
 #include "lib/refine/refine.hpp"
@@ -36,14 +37,27 @@ using PartOfView = std::function<PixelPart(std::size_t view, int x0, int y0, int
 [[nodiscard]] std::vector<ColourMap> exposureMaps(std::span<const Camera> cameras,
                                                   const PartOfView& partOf);
 
+/// A point of a view at which colours are compared.
+struct ColourPoint {
+    glm::dvec3 world;
+    glm::dvec3 normal;  ///< of the surface; where single pixels are compared: towards their camera
+    glm::vec3 colour;   ///< stored values, 0..1
+};
+/// Those of each view.
+using ColourPoints = std::vector<std::vector<ColourPoint>>;
+/// Those of a view inside of surfaces, some hundred: means of 3x3 pixels.
+[[nodiscard]] std::vector<ColourPoint> colourPointsOf(const ReferenceView& view);
+
 /// Calls its argument with the number of each view, from any thread; `PartOfView` is asked for that
 /// view alone meanwhile.
 using EachView = std::function<Result<void>(const std::function<void(std::size_t view)>& body)>;
-/// The same of views that are not all there at a time: `each` is called three times, where views
-/// have few points inside of surfaces six times. Errors: those of `each`.
+/// The same of views that are not all there at a time: `each` is called twice, where very many
+/// views show the same three times; where views have few points inside of surfaces twice as often.
+/// Once less where colourPointsOf() all views are `known`. Errors: those of `each`.
 [[nodiscard]] Result<std::vector<ColourMap>> exposureMaps(std::span<const Camera> cameras,
                                                           const PartOfView& partOf,
-                                                          const EachView& each);
+                                                          const EachView& each,
+                                                          const ColourPoints* known = nullptr);
 
 /// Applies a map to the texels from (x0, y0) to (x1, y1), the last excluded, but for transparent
 /// ones; the report gets the pixels that changed, and by how much (a share of white).

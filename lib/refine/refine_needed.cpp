@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "lib/model/some_views.hpp"
 #include "lib/refine/exposure.hpp"
 #include "lib/refine/refine_depth.hpp"
 
@@ -31,52 +32,12 @@ bool tellsSideBySide(const ViewTable& table, const Part& part) {
             std::ranges::all_of(part.views, captured));
 }
 
-/// Some views of a table: the others are not read.
-class SomeViews : public ViewTable {
-  public:
-    SomeViews(const ViewTable& all, const std::vector<std::size_t>& numbers)
-        : ViewTable(headersOf(all, numbers), kindsOf(all, numbers),
-                    all.planesKnown() ? Planes::known : Planes::withPixels),
-          all_(all),
-          numbers_(numbers) {}
-
-    std::uint64_t bytesHeld() const override { return all_.bytesHeld(); }
-    std::uint64_t bytesGiven(std::size_t index) const override {
-        return all_.bytesGiven(numbers_[index]);
-    }
-    std::uint64_t bytesToMake(std::size_t index) const override {
-        return all_.bytesToMake(numbers_[index]);
-    }
-    int mostAtOnce() const override { return all_.mostAtOnce(); }
-
-  protected:
-    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
-        return all_.view(numbers_[index], job);
-    }
-
-  private:
-    static Bundle headersOf(const ViewTable& all, const std::vector<std::size_t>& numbers) {
-        Bundle headers;
-        for (const std::size_t i : numbers)
-            static_cast<ViewHeader&>(headers.views.emplace_back()) = all.about().views[i];
-        return headers;
-    }
-    static std::vector<ViewImageKinds> kindsOf(const ViewTable& all,
-                                               const std::vector<std::size_t>& numbers) {
-        std::vector<ViewImageKinds> kinds;
-        for (const std::size_t i : numbers) kinds.push_back(all.kindsOf(i));
-        return kinds;
-    }
-
-    const ViewTable& all_;
-    const std::vector<std::size_t>& numbers_;
-};
-
 /// The same as what matchExposure() and refineDepth() find in memory.
 class PartNeeds {
   public:
     PartNeeds(const ViewTable& table, const Part& part, Job& job)
-        : views_(table, part.views),
+        : table_(table),
+          views_(someViewsOf(table, part.views)),
           part_(part),
           job_(job),
           now_(part.views.size()),
@@ -88,16 +49,25 @@ class PartNeeds {
             return depth_.any();
         }
         std::vector<Camera> cameras;
-        for (const ViewHeader& view : views_.about().views) cameras.push_back(view.camera);
+        for (const ViewHeader& view : views_->about().views) cameras.push_back(view.camera);
         const auto partOf = [&](std::size_t k, int, int, int, int) {
             const ReferenceView& view = *now_[k];
             return PixelPart{&view.texture, &view.depth, 0, 1, view.camera.width};
         };
-        const auto eachView = [&](const std::function<void(std::size_t)>& body) {
+        const auto isKnown = [&] { return depthDone_ && depth_.any(); };
+        const auto eachView = [&](const std::function<void(std::size_t)>& body) -> Result<void> {
+            // Colours need not be looked at any more.
+            if (isKnown()) return fail(ErrorCode::failed, "depth is refined");
             return each(body);
         };
-        STX_TRY(const auto maps, exposureMaps(cameras, partOf, eachView));
-        return depth_.any() || !std::ranges::all_of(maps, &ColourMap::changesNothing);
+        ColourPoints known;
+        if (const auto* looked = dynamic_cast<const ViewsLookedAt*>(&table_);
+            looked && looked->colourPoints())
+            for (const std::size_t i : part_.views) known.push_back((*looked->colourPoints())[i]);
+        auto maps = exposureMaps(cameras, partOf, eachView, known.empty() ? nullptr : &known);
+        if (isKnown()) return true;
+        if (!maps) return propagate(maps);
+        return !std::ranges::all_of(*maps, &ColourMap::changesNothing);
     }
 
   private:
@@ -105,7 +75,7 @@ class PartNeeds {
     Result<void> each(const std::function<void(std::size_t)>& body) {
         std::vector<RefineNeeds> needs(now_.size(), RefineNeeds(part_.left));
         STX_CHECK(forEachView(
-            views_, peak::kRefine, job_,
+            *views_, peak::kRefine, job_,
             [&](std::size_t k, std::shared_ptr<const ReferenceView> view) -> Result<void> {
                 if (!depthDone_) needs[k].add(RefineView{view.get(), &view->texture, &view->depth});
                 now_[k] = std::move(view);
@@ -118,7 +88,8 @@ class PartNeeds {
         return {};
     }
 
-    const SomeViews views_;
+    const ViewTable& table_;
+    const std::unique_ptr<const ViewTable> views_;
     const Part& part_;
     Job& job_;
     std::vector<std::shared_ptr<const ReferenceView>> now_;

@@ -242,6 +242,10 @@ ViewSummary summaryOfView(const ReferenceView& view) {
     return surface::summaryOf(view);
 }
 
+bool mayBeSummaryOf(const ViewSummary& summary, const ReferenceView& view) {
+    return surface::mayBeSummaryOf(summary, view);
+}
+
 bool tellWithoutPixels(const std::vector<ReferenceView>& views) {
     return std::ranges::all_of(views, surface::tellsWithoutPixels);
 }

@@ -33,6 +33,9 @@ namespace stx {
 /// What is kept of a view, so that its pixels need not be read for pictures in which it has no
 /// part. The same pixels have the same summary.
 [[nodiscard]] ViewSummary summaryOfView(const ReferenceView& view);
+/// False where a summary says of a view what its pixels do not show, as far as a quick look tells:
+/// how many points there are, whether all is covered in full, and how far what it shows reaches.
+[[nodiscard]] bool mayBeSummaryOf(const ViewSummary& summary, const ReferenceView& view);
 /// Whether summaries of such views, by their headers, may spare the reading of some.
 [[nodiscard]] bool tellWithoutPixels(const std::vector<ReferenceView>& views);
 /// Of each view of a bundle whether its pixels must be there for some pictures; `views` are their

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/peak_memory.hpp"
 
 namespace stx {
 namespace {
@@ -131,6 +134,11 @@ ViewSamples samplesOfView(const ReferenceView& view, std::size_t number, std::in
 
 namespace {
 
+/// With which a view samples the place of a sample that it sees, or that is its own.
+double densityOf(const Sighting& s, double ownDensity) {
+    return std::max(s.cosine, 0.05) * (s.visible ? s.density * s.density : ownDensity);
+}
+
 /// Of a sample of view `own`, which samples it with density `ownDensity` (squared): by the density
 /// with which all views sample its place. `by`: how view k sees it.
 template <class SightingBy>
@@ -139,8 +147,7 @@ double areaOf(std::size_t own, double ownDensity, std::size_t views, std::int64_
     double density = 0;  // samples of all views per unit of area
     for (std::size_t k = 0; k < views; ++k) {
         const Sighting s = by(k);
-        if (s.visible || own == k)
-            density += std::max(s.cosine, 0.05) * (s.visible ? s.density * s.density : ownDensity);
+        if (s.visible || own == k) density += densityOf(s, ownDensity);
     }
     return static_cast<double>(stride) / density;
 }
@@ -160,11 +167,12 @@ std::vector<Seen> seenOf(std::size_t samples, const SightingOfSample& sighting) 
             seen.push_back({static_cast<std::uint32_t>(i), static_cast<float>(s.cosine),
                             static_cast<float>(s.density)});
     }
+    seen.shrink_to_fit();
     return seen;
 }
 
 CoverProblem problemOf(const std::vector<SurfaceSample>& samples,
-                       const std::vector<std::vector<Seen>>& seen, double targetDensity) {
+                       std::vector<std::vector<Seen>> seen, double targetDensity) {
     CoverProblem problem;
     for (const auto& s : samples) problem.weights.push_back(s.area);
     double target = targetDensity;
@@ -182,7 +190,9 @@ CoverProblem problemOf(const std::vector<SurfaceSample>& samples,
     }
     problem.views.resize(seen.size());
     for (std::size_t v = 0; v < seen.size(); ++v) {
-        for (const auto& s : seen[v]) {
+        const std::vector<Seen> of = std::exchange(seen[v], {});
+        problem.views[v].reserve(of.size());
+        for (const auto& s : of) {
             const double rate = target > 0 ? std::min(1.0, s.density / target) : 1.0;
             problem.views[v].push_back({s.sample, worthOf(s.cosine * rate)});
         }
@@ -238,7 +248,7 @@ CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
         seen[v] = seenOf(samples.size(),
                          [&](std::size_t i) { return sightingOf(candidates[v], samples[i]); });
     });
-    return problemOf(samples, seen, targetDensity);
+    return problemOf(samples, std::move(seen), targetDensity);
 }
 
 CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
@@ -246,7 +256,56 @@ CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
     std::vector<std::vector<Seen>> seen;
     for (const std::vector<Sighting>& of : sightings)
         seen.push_back(seenOf(samples.size(), [&](std::size_t i) { return of[i]; }));
-    return problemOf(samples, seen, targetDensity);
+    return problemOf(samples, std::move(seen), targetDensity);
+}
+
+Result<CoverProblem> coverProblem(const ViewTable& table, std::int64_t points, int count,
+                                  double targetDensity, Job& job) {
+    const std::int64_t stride = std::max<std::int64_t>(1, points / std::max(count, 1));
+    const std::size_t views = table.count();
+    std::vector<ViewSamples> ofViews(views);
+    const auto sample = [&](std::size_t i,
+                            const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
+        const DepthSurface surface = depthSurface(*view, {});
+        ofViews[i] = samplesOfView(*view, i, stride, [&](int x, int y) {
+            return std::pair(surface.w.at(x, y), surface.gradient.at(x, y));
+        });
+        return {};
+    };
+    STX_CHECK(forEachView(table, peak::kSelect, job, sample));
+    std::vector<SurfaceSample> samples;
+    std::vector<double> ownDensity;
+    std::vector<std::size_t> own;  // whose sample it is
+    for (std::size_t i = 0; i < views; ++i) {
+        const ViewSamples of = std::exchange(ofViews[i], {});
+        samples.insert(samples.end(), of.samples.begin(), of.samples.end());
+        ownDensity.insert(ownDensity.end(), of.ownDensity.begin(), of.ownDensity.end());
+        own.resize(samples.size(), i);
+    }
+    // Sums as of areaOf(): in the order of the views.
+    std::vector<double> density(samples.size(), 0.0);
+    std::vector<std::vector<double>> added(views);
+    std::vector<std::vector<Seen>> seen(views);
+    const auto look = [&](std::size_t k,
+                          const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
+        const CandidateView candidate = candidateOf(*view);
+        added[k].resize(samples.size(), 0.0);
+        seen[k] = seenOf(samples.size(), [&](std::size_t i) {
+            const Sighting s = sightingOf(candidate, samples[i]);
+            if (s.visible || own[i] == k) added[k][i] = densityOf(s, ownDensity[i]);
+            return s;
+        });
+        return {};
+    };
+    const auto add = [&](std::size_t k) -> Result<void> {
+        const std::vector<double> of = std::exchange(added[k], {});
+        for (std::size_t i = 0; i < of.size(); ++i) density[i] += of[i];
+        return {};
+    };
+    STX_CHECK(forEachView(table, peak::kSelect, job, look, add));
+    for (std::size_t i = 0; i < samples.size(); ++i)
+        samples[i].area = static_cast<double>(stride) / density[i];
+    return problemOf(samples, std::move(seen), targetDensity);
 }
 
 }  // namespace stx

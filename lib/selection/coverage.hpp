@@ -9,6 +9,7 @@
 
 #include "lib/model/bundle.hpp"
 #include "lib/model/mesh.hpp"
+#include "lib/model/view_table.hpp"
 #include "lib/selection/cover.hpp"
 #include "lib/surface/depth_gradient.hpp"
 
@@ -82,5 +83,10 @@ using SurfaceAt = std::function<std::pair<float, glm::vec2>(int x, int y)>;
 [[nodiscard]] CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
                                         std::span<const std::vector<Sighting>> seen,
                                         double targetDensity);
+
+/// coverProblem() of sampleBundle() for a table, whose views are read twice, one by one. `points`:
+/// of all views. Errors: those of the views, memory, cancelled.
+[[nodiscard]] Result<CoverProblem> coverProblem(const ViewTable& table, std::int64_t points,
+                                                int count, double targetDensity, Job& job);
 
 }  // namespace stx

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <memory>
+#include <numeric>
 
 #include "lib/base/parallel.hpp"
 #include "lib/capture/capture.hpp"
@@ -65,30 +67,65 @@ Selection solve(const CoverProblem& problem, const SelectSettings& settings) {
 
 }  // namespace
 
+namespace {
+
+/// Errors where no view has a point; a note where some have none.
+Result<void> checkPoints(const std::vector<std::int64_t>& points, Job& job) {
+    const auto empty = std::ranges::count(points, 0);
+    if (empty == std::ssize(points))
+        return fail(ErrorCode::invalidInput, "none of the {} views has a point to select by",
+                    empty);
+    if (empty > 0)
+        job.note(fmt::format("{} of {} views dropped: they are empty", empty, points.size()));
+    return job.checkCancelled();
+}
+
+/// Each sample is looked for in each view: thousands of views get fewer samples.
+int samplesFor(const SelectSettings& settings, std::size_t views) {
+    return static_cast<int>(std::min<std::int64_t>(
+        settings.samples, std::max<std::int64_t>(1000, kLooks / static_cast<std::int64_t>(views))));
+}
+
+}  // namespace
+
 Result<Selection> selectViews(const Bundle& bundle, const SelectSettings& settings, Job& job) {
     STX_CHECK(checkSettings(settings));
     STX_CHECK(bundle.check());
     STX_CHECK(checkPeak(peak::kSelect, bundle.views, job.limits));
     std::vector<CandidateView> candidates;
-    int empty = 0;
+    std::vector<std::int64_t> points;
     for (const auto& v : bundle.views) {
         candidates.push_back(candidateOf(v));
-        empty += v.pointCount() == 0 ? 1 : 0;
+        points.push_back(v.pointCount());
     }
-    if (empty == static_cast<int>(bundle.views.size()))
-        return fail(ErrorCode::invalidInput, "none of the {} views has a point to select by",
-                    empty);
-    if (empty > 0)
-        job.note(fmt::format("{} of {} views dropped: they are empty", empty, bundle.views.size()));
-    STX_CHECK(job.checkCancelled());
-    // Each sample is looked for in each view: thousands of views get fewer samples.
-    const auto views = static_cast<std::int64_t>(bundle.views.size());
-    const auto count =
-        std::min<std::int64_t>(settings.samples, std::max<std::int64_t>(1000, kLooks / views));
-    const auto samples = sampleBundle(bundle, static_cast<int>(count));
+    STX_CHECK(checkPoints(points, job));
+    const auto samples = sampleBundle(bundle, samplesFor(settings, bundle.views.size()));
     STX_CHECK(job.checkCancelled());
     const auto problem = coverProblem(samples, candidates, settings.targetDensity);
     STX_CHECK(job.checkCancelled());
+    return solve(problem, settings);
+}
+
+Result<Selection> selectViews(const ViewTable& table, const SelectSettings& settings, Job& job) {
+    STX_CHECK(checkSettings(settings));
+    // What there is to say is said when the chosen ones are read again.
+    Job quiet;
+    quiet.workFor(job);
+    std::vector<std::int64_t> points(table.count());
+    if (const auto summaries = table.summaries(); !summaries.empty()) {
+        std::ranges::transform(summaries, points.begin(), &ViewSummary::points);
+    } else {
+        const auto count = [&](std::size_t i,
+                               const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
+            points[i] = view->pointCount();
+            return {};
+        };
+        STX_CHECK(forEachView(table, peak::kSelect, quiet, count));
+    }
+    STX_CHECK(checkPoints(points, job));
+    const std::int64_t all = std::accumulate(points.begin(), points.end(), std::int64_t{0});
+    STX_TRY(const auto problem, coverProblem(table, all, samplesFor(settings, table.count()),
+                                             settings.targetDensity, quiet));
     return solve(problem, settings);
 }
 

@@ -8,6 +8,7 @@
 #include "lib/geometry/view_layout.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/mesh.hpp"
+#include "lib/model/view_table.hpp"
 
 namespace stx {
 
@@ -42,6 +43,11 @@ struct Selection {
 /// points are never chosen (said with a note). Errors: settings out of range, a bundle that fails
 /// check() or has no point, cancelled.
 [[nodiscard]] Result<Selection> selectViews(const Bundle& bundle, const SelectSettings& settings,
+                                            Job& job);
+
+/// The same of a table, whose views are read one by one: twice, and where their file does not say
+/// how many points they have three times.
+[[nodiscard]] Result<Selection> selectViews(const ViewTable& table, const SelectSettings& settings,
                                             Job& job);
 
 /// The bundle with only the chosen views, in their old order.

@@ -2,7 +2,7 @@
 """A capture that memory does not hold: cameras along a wall, as an image set. It is converted, and a picture is drawn from
 the bundle, each under a limit that a part of its views fits.
 
-By hand, of 400 views of 12 megapixels (an hour on two cores), with times beside those of the 16 nearest views:
+By hand, of 400 views of 12 megapixels (three quarters of an hour on two cores), with times beside those of the 16 nearest views:
 
     tests/cli/large_capture_test.py build/release/bin/stx - - --measure 1 --views 400 --width 4096 --convert 2048 --picture 4096
 """

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <memory>
 #include <span>
 
 #include "lib/base/parallel.hpp"
@@ -53,22 +54,37 @@ struct Triangle {
     std::array<std::uint32_t, 3> corners;
 };
 
+/// Whether a view's picture may show some of a box, which is given by its corners in the world: not
+/// where all are beyond one of its sides, by a pixel or more, or behind it.
+bool mayShow(const Camera& c, std::span<const glm::dvec3> corners) {
+    std::array<bool, 5> beyond{true, true, true, true, true};
+    for (const glm::dvec3& corner : corners) {
+        const glm::dvec3 p = glm::conjugate(c.orientation) * (corner - c.position);
+        const double w = c.orthographic ? 1.0 : -p.z;
+        const double x = c.fx * p.x + c.cx * w, y = -c.fy * p.y + c.cy * w;
+        const double inside[] = {c.orthographic ? 1.0 : w, x + w, (c.width + 1) * w - x, y + w,
+                                 (c.height + 1) * w - y};
+        for (std::size_t k = 0; k < beyond.size(); ++k) beyond[k] = beyond[k] && inside[k] < 0;
+    }
+    return std::ranges::none_of(beyond, [](bool all) { return all; });
+}
+
 class Maker {
   public:
-    explicit Maker(const SurfaceScene& scene)
-        : scene_(scene), triangles_(scene.sources.size()), used_(scene.sources.size()) {}
+    explicit Maker(const SurfaceScene& scene) : scene_(scene), used_(scene.sources.size()) {}
 
-    /// Before surfaceOf() of any: all triangles of a view.
+    /// Before surfaceOf() of any. Triangles are found again then: those of all views are many.
     void prepare(std::size_t number) {
         const Source& s = scene_.sources[number];
-        triangles_[number] = trianglesOf(s);
         used_[number].resize(static_cast<std::size_t>(s.width) * s.height);
-        for (const Triangle& t : triangles_[number])
-            for (const std::uint32_t corner : t.corners) used_[number][corner] = true;
+        for (int by = 0; by < s.blocksY; ++by)
+            for (int bx = 0; bx < s.blocksX; ++bx)
+                for (const Triangle& t : trianglesOf(s, bx, by))
+                    for (const std::uint32_t corner : t.corners) used_[number][corner] = true;
     }
 
-    /// All triangles of a view, without a choice among views.
-    [[nodiscard]] std::vector<Triangle> trianglesOf(const Source& s) const {
+    /// All triangles of a block of a view, without a choice among views.
+    [[nodiscard]] static std::vector<Triangle> trianglesOf(const Source& s, int column, int row) {
         std::vector<Triangle> out;
         const auto add = [&](int ax, int ay, int bx, int by, int cx, int cy) {
             const Triangle t{{index(s, ax, ay), index(s, bx, by), index(s, cx, cy)}};
@@ -76,22 +92,17 @@ class Maker {
                 if (!shows(s, corner)) return;
             out.push_back(t);
         };
+        const SourceBlock& block = s.blocks[static_cast<std::size_t>(row) * s.blocksX + column];
+        const int x0 = column * kBlock, y0 = row * kBlock;
+        for (std::uint32_t l = block.leafBegin; l < block.leafEnd; ++l) addLeaf(s.leaves[l], add);
+        if (!block.anyCell) return out;
         BlockBuffer buffer;
-        for (int by = 0; by < s.blocksY; ++by) {
-            for (int bx = 0; bx < s.blocksX; ++bx) {
-                const SourceBlock& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
-                const int x0 = bx * kBlock, y0 = by * kBlock;
-                for (std::uint32_t l = block.leafBegin; l < block.leafEnd; ++l)
-                    addLeaf(s.leaves[l], add);
-                if (!block.anyCell) continue;
-                const BlockTexels texels = blockTexels(s, x0, y0, buffer);
-                for (int j = 0; j < kBlock; ++j) {
-                    for (std::uint32_t left = block.cells[static_cast<std::size_t>(j)]; left;
-                         left &= left - 1) {
-                        const int i = std::countr_zero(left);
-                        addCell(cellShape(s, texels, i, j), x0 + i, y0 + j, add);
-                    }
-                }
+        const BlockTexels texels = blockTexels(s, x0, y0, buffer);
+        for (int j = 0; j < kBlock; ++j) {
+            for (std::uint32_t left = block.cells[static_cast<std::size_t>(j)]; left;
+                 left &= left - 1) {
+                const int i = std::countr_zero(left);
+                addCell(cellShape(s, texels, i, j), x0 + i, y0 + j, add);
             }
         }
         return out;
@@ -139,8 +150,7 @@ class Maker {
         const std::size_t count = used.size();
         std::vector<std::uint32_t> numbers(count, kNone);
         ViewSurface out;
-        for (const Triangle& t : triangles_[source]) {
-            if (shownBetter(s, t)) continue;
+        const auto add = [&](const Triangle& t) {
             for (const std::uint32_t corner : t.corners) {
                 std::uint32_t& number = numbers[corner];
                 if (number == kNone) {
@@ -149,6 +159,15 @@ class Maker {
                     out.positions.emplace_back(worldOf(s, corner));
                 }
                 out.triangles.push_back(number);
+            }
+        };
+        for (int by = 0; by < s.blocksY; ++by) {
+            for (int bx = 0; bx < s.blocksX; ++bx) {
+                const auto triangles = trianglesOf(s, bx, by);
+                if (triangles.empty()) continue;
+                const auto others = othersAt(s, bx, by);
+                for (const Triangle& t : triangles)
+                    if (!shownBetter(s, t, others)) add(t);
             }
         }
         for (std::uint32_t pixel = 0; pixel < count; ++pixel) {
@@ -315,7 +334,27 @@ class Maker {
         }
     }
 
-    [[nodiscard]] bool shownBetter(const Source& s, const Triangle& t) const {
+    /// The other views whose pictures may show some of a block's triangles.
+    [[nodiscard]] std::vector<const Source*> othersAt(const Source& s, int bx, int by) const {
+        const SourceBlock& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
+        // Corners are the middles of its pixels and of those beside it.
+        const double x0 = bx * kBlock, y0 = by * kBlock, reach = kBlock + 1;
+        std::array<glm::dvec3, 8> corners;
+        for (std::size_t k = 0; k < corners.size(); ++k) {
+            const double dist = s.space.axis.dist(k & 4 ? block.qMax : block.qMin);
+            corners[k] = s.view->camera.position +
+                         s.view->camera.orientation *
+                             s.view->camera.unproject(x0 + (k & 1 ? reach : 0),
+                                                      y0 + (k & 2 ? reach : 0), dist);
+        }
+        std::vector<const Source*> out;
+        for (const Source& other : scene_.sources)
+            if (&other != &s && mayShow(other.view->camera, corners)) out.push_back(&other);
+        return out;
+    }
+
+    [[nodiscard]] bool shownBetter(const Source& s, const Triangle& t,
+                                   std::span<const Source* const> others) const {
         std::array<glm::dvec3, 3> p;
         glm::ivec2 low(s.width, s.height), high(0);
         for (std::size_t k = 0; k < 3; ++k) {
@@ -339,20 +378,19 @@ class Maker {
                 const glm::dvec3 at =
                     c.project(glm::conjugate(c.orientation) * (place - c.position));
                 // What folds there for others is an outline that this view alone shows in full.
-                return anotherShows(s, place, normal, densityAt(s, place, normal, at),
+                return anotherShows(others, place, normal, densityAt(s, place, normal, at),
                                     besideEdge(s, at) ? 0.0 : kAtCrease);
             });
     }
 
     /// Some other view sees the place from the same side, more densely by kDenser.
-    [[nodiscard]] bool anotherShows(const Source& s, glm::dvec3 world, glm::dvec3 normal,
-                                    double here, double atCrease) const {
-        for (const Source& other : scene_.sources) {
-            if (&other == &s) continue;
-            const Camera& c = other.view->camera;
+    [[nodiscard]] bool anotherShows(std::span<const Source* const> others, glm::dvec3 world,
+                                    glm::dvec3 normal, double here, double atCrease) const {
+        for (const Source* other : others) {
+            const Camera& c = other->view->camera;
             const glm::dvec3 ray = c.orthographic ? c.forward() : world - c.position;
             if (!(glm::dot(ray, normal) < 0)) continue;
-            if (density(other, world, normal, atCrease) > kDenser * here) return true;
+            if (density(*other, world, normal, atCrease) > kDenser * here) return true;
         }
         return false;
     }
@@ -375,29 +413,54 @@ class Maker {
     }
 
     const SurfaceScene& scene_;
-    std::vector<std::vector<Triangle>> triangles_;  ///< of each source
-    std::vector<std::vector<bool>> used_;           ///< pixels that are corners
+    std::vector<std::vector<bool>> used_;  ///< of each source: pixels that are corners
 };
 
 }  // namespace
 
-Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job) {
+Result<void> forEachSurface(
+    const Bundle& bundle, PixelSpool* spool, Job& job,
+    const std::function<Result<void>(std::size_t index, ViewSurface surface)>& take) {
     STX_CHECK(bundle.check());
-    STX_CHECK(checkPeak(peak::kSurfaces, bundle.views, job.limits));
+    if (!spool) STX_CHECK(checkPeak(peak::kSurfaces, bundle.views, job.limits));
     RenderSettings settings;
     settings.without.add(Stage::sharpen);
     settings.without.add(Stage::rims);
-    const SurfaceScene scene(bundle, settings);
+    auto scene = std::make_unique<const SurfaceScene>(
+        spool ? PageSet(bundle, *spool) : PageSet(bundle), settings);
     STX_CHECK(job.checkCancelled());
-    Maker maker(scene);
+    auto maker = std::make_unique<Maker>(*scene);
+    const auto count = static_cast<std::int64_t>(bundle.views.size());
+    parallelFor(0, count, [&](std::int64_t i) { maker->prepare(static_cast<std::size_t>(i)); });
+    const std::int64_t atOnce = std::max<std::int64_t>(1, threadCount());
+    for (std::int64_t first = 0; first < count; first += atOnce) {
+        const std::int64_t end = std::min(first + atOnce, count);
+        std::vector<ViewSurface> found(static_cast<std::size_t>(end - first));
+        parallelFor(first, end, [&](std::int64_t i) {
+            if (job.cancelled) return;
+            found[static_cast<std::size_t>(i - first)] =
+                maker->surfaceOf(static_cast<std::size_t>(i));
+        });
+        STX_CHECK(job.checkCancelled());
+        if (end == count) {
+            // The last views are written without what they were made of.
+            maker.reset();
+            scene.reset();
+        }
+        for (std::int64_t i = first; i < end; ++i)
+            STX_CHECK(take(static_cast<std::size_t>(i),
+                           std::move(found[static_cast<std::size_t>(i - first)])));
+    }
+    return {};
+}
+
+Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job) {
     std::vector<ViewSurface> out(bundle.views.size());
-    const auto count = static_cast<std::int64_t>(out.size());
-    parallelFor(0, count, [&](std::int64_t i) { maker.prepare(static_cast<std::size_t>(i)); });
-    parallelFor(0, count, [&](std::int64_t i) {
-        if (job.cancelled) return;
-        out[static_cast<std::size_t>(i)] = maker.surfaceOf(static_cast<std::size_t>(i));
-    });
-    STX_CHECK(job.checkCancelled());
+    STX_CHECK(forEachSurface(bundle, nullptr, job,
+                             [&](std::size_t index, ViewSurface surface) -> Result<void> {
+                                 out[index] = std::move(surface);
+                                 return {};
+                             }));
     return out;
 }
 

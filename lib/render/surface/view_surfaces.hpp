@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <glm/glm.hpp>
@@ -38,5 +40,11 @@ struct ViewSurface {
 ///
 /// Errors: a bundle that fails check(), memory over the limit, cancelled.
 [[nodiscard]] Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job);
+/// The same, each given to `take` in the order of the views while those of later ones are not made
+/// yet. `take` may change the colours of that view. `spool`, if any, is that of the bundle, and
+/// keeps what is made of its pixels; then no limit is checked. Errors: also those of `take`.
+[[nodiscard]] Result<void> forEachSurface(
+    const Bundle& bundle, PixelSpool* spool, Job& job,
+    const std::function<Result<void>(std::size_t index, ViewSurface surface)>& take);
 
 }  // namespace stx

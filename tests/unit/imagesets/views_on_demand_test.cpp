@@ -7,6 +7,7 @@
 #include "formats/imagesets/export.hpp"
 #include "formats/imagesets/set_views.hpp"
 #include "lib/model/same_pictures.hpp"
+#include "lib/refine/refine_needed.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
 using namespace stx;
@@ -33,9 +34,21 @@ Result<std::unique_ptr<ViewTable>> openKept(const std::filesystem::path& set,
     return openSetViews(set, options, job, held);
 }
 
+void expectPointsOf(const ReferenceView& view, const std::vector<ColourPoint>& points) {
+    const auto expected = colourPointsOf(view);
+    EXPECT_GT(expected.size(), 20u);
+    ASSERT_EQ(points.size(), expected.size());
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        EXPECT_EQ(points[k].world, expected[k].world) << k;
+        EXPECT_EQ(points[k].normal, expected[k].normal) << k;
+        EXPECT_EQ(points[k].colour, expected[k].colour) << k;
+    }
+}
+
 /// Views one by one are those of the set in memory, and the same is said.
+/// `keeps`: points at which colours are compared are kept of the first look.
 void expectSameOnDemand(const std::filesystem::path& set, const ImageSetOptions& options,
-                        const char* noted = nullptr) {
+                        const char* noted = nullptr, bool keeps = true) {
     Job job;
     Said whole, each;
     const auto held = openKept(set, options, kAllHeld, job, whole);
@@ -54,6 +67,9 @@ void expectSameOnDemand(const std::filesystem::path& set, const ImageSetOptions&
     EXPECT_EQ(a.bounds->max, b.bounds->max);
     ASSERT_EQ(a.views.size(), b.views.size());
     EXPECT_EQ((*held)->kinds(), (*table)->kinds());
+    const auto* looked = dynamic_cast<const ViewsLookedAt*>(table->get());
+    ASSERT_TRUE(looked);
+    ASSERT_EQ(looked->colourPoints() != nullptr, keeps);
     // In another order than they are in the set, and the first again.
     for (std::size_t k = 0; k <= a.views.size(); ++k) {
         const std::size_t i = (2 * a.views.size() - 1 - k) % a.views.size();
@@ -66,6 +82,7 @@ void expectSameOnDemand(const std::filesystem::path& set, const ImageSetOptions&
         EXPECT_EQ((*view)->farPlane, a.views[i].farPlane);
         EXPECT_EQ((*view)->noDepth, a.views[i].noDepth);
         EXPECT_TRUE(samePictures(**view, a.views[i])) << i;
+        if (keeps) expectPointsOf(**view, (*looked->colourPoints())[i]);
     }
     each.notes = job.takeNotes();
     EXPECT_EQ(whole.notes, each.notes);
@@ -121,7 +138,7 @@ TEST(SetViewsOnDemand, AreThoseOfALensThatIsUndone) {
 TEST(SetViewsOnDemand, AreThoseOfASetThatIsFarAway) {
     const TemporaryFolder folder;
     writeRoom(folder, "", {4e6, -2e6, 1e5});
-    expectSameOnDemand(folder.path(), {}, "is subtracted");
+    expectSameOnDemand(folder.path(), {}, "is subtracted", false);
 }
 
 TEST(SetViewsOnDemand, AreAllLinearWhereOneIs) {
@@ -134,7 +151,7 @@ TEST(SetViewsOnDemand, AreAllLinearWhereOneIs) {
     writeBytes(folder / "c1.png", *png);
     ImageSetOptions options;
     options.deepColour = true;
-    expectSameOnDemand(folder.path(), options);
+    expectSameOnDemand(folder.path(), options, nullptr, false);
 }
 
 TEST(SetViewsOnDemand, AreThoseOfOurExportsAndColmaps) {

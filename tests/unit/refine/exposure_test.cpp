@@ -9,10 +9,12 @@
 
 #include "lib/base/job.hpp"
 #include "lib/packing/packing.hpp"
+#include "lib/refine/exposure.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/factory.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "tests/noisy_depth.hpp"
+#include "tests/torus_bundle.hpp"
 
 namespace stx {
 namespace {
@@ -186,6 +188,43 @@ TEST(MatchedPictures, AViewsOwnCameraGivesItsOwnColours) {
     EXPECT_EQ(job.takeNotes().size(), 1u);
     const Camera between = analyticCamera(AnalyticScene::object, 0.5, 6);
     EXPECT_NE(pictureAt(between, true), pictureAt(between, false));
+}
+
+/// How often views are looked at that are not all there at a time; the maps are those of all views
+/// in memory.
+int looksAt(const Bundle& bundle) {
+    std::vector<Camera> cameras;
+    for (const ReferenceView& view : bundle.views) cameras.push_back(view.camera);
+    const auto partOf = [&](std::size_t k, int, int, int, int) {
+        const ReferenceView& view = bundle.views[k];
+        return PixelPart{&view.texture, &view.depth, 0, 1, view.camera.width};
+    };
+    int looks = 0;
+    const auto each = [&](const std::function<void(std::size_t)>& body) -> Result<void> {
+        ++looks;
+        for (std::size_t v = 0; v < cameras.size(); ++v) body(v);
+        return {};
+    };
+    const auto found = exposureMaps(cameras, partOf, each);
+    const auto expected = exposureMaps(cameras, partOf);
+    EXPECT_TRUE(found);
+    for (std::size_t v = 0; v < expected.size(); ++v) {
+        EXPECT_EQ((*found)[v].gain, expected[v].gain) << v;
+        EXPECT_EQ((*found)[v].offset, expected[v].offset) << v;
+    }
+    // One view is darker, and is found.
+    EXPECT_FALSE(expected[1].changesNothing());
+    return looks;
+}
+
+TEST(Exposure, ViewsAreReadTwice) {
+    for (const int views : {10, 200}) {
+        Bundle bundle = torusViews(64, glm::dvec3(0), {ViewLayout::Kind::sphere, views, 0});
+        for (glm::u8vec4& c : bundle.views[1].texture.rgba8()->pixels())
+            c = glm::u8vec4(glm::u8vec3(0.8f * glm::vec3(c) + 0.5f), c.a);
+        // What so many views show of each other is too much to keep.
+        EXPECT_EQ(looksAt(bundle), views == 10 ? 2 : 3) << views;
+    }
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "lib/selection/selection.hpp"
 
+#include <atomic>
 #include <random>
 #include <set>
 
@@ -143,6 +144,67 @@ TEST(Selection, FromABundleDropsWhatAddsNothing) {
     ASSERT_TRUE(half);
     EXPECT_LT(half->views.size(), 5u);
     EXPECT_GE(half->quality.back(), 0.5);
+}
+
+/// Gives copies: nothing is held.
+class ViewsToSelect : public ViewTable {
+  public:
+    explicit ViewsToSelect(const Bundle& bundle)
+        : ViewTable(headersOf(bundle),
+                    std::vector<ViewImageKinds>(bundle.views.size(),
+                                                ViewImageKinds::of(bundle.views[0]))),
+          bundle_(bundle) {}
+    mutable std::atomic<int> asked = 0;
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job&) const override {
+        ++asked;
+        return std::make_shared<ReferenceView>(bundle_.views[index]);
+    }
+
+  private:
+    static Bundle headersOf(const Bundle& bundle) {
+        Bundle headers;
+        for (const ReferenceView& view : bundle.views)
+            static_cast<ViewHeader&>(headers.views.emplace_back()) = view;
+        return headers;
+    }
+    const Bundle& bundle_;
+};
+
+TEST(Selection, OneByOneIsThatOfAllInMemory) {
+    Bundle bundle;
+    std::mt19937 random(5);
+    const auto side = [&] { return static_cast<double>(random() % 2001) / 1000 - 1; };
+    for (int i = 0; i < 12; ++i)
+        bundle.views.push_back(analytic::capture(
+            analytic::torus,
+            analytic::lookingAt(3.0 * glm::normalize(glm::dvec3(side(), side(), side())), 96), 16));
+    bundle.views[4].depth = Image<float>(96, 96, kNoDepth);
+    const ViewsToSelect table(bundle);
+    for (const int count : {0, 1, 5}) {
+        SelectSettings settings;
+        settings.count = count;
+        settings.samples = 3000;
+        Job job;
+        const auto all = selectViews(bundle, settings, job);
+        const auto notes = job.takeNotes();
+        table.asked = 0;
+        const auto each = selectViews(table, settings, job);
+        ASSERT_TRUE(all && each);
+        EXPECT_EQ(job.takeNotes(), notes);
+        EXPECT_EQ(table.asked, 3 * 12);
+        EXPECT_EQ(each->views, all->views);
+        EXPECT_EQ(each->quality, all->quality);
+        EXPECT_EQ(each->certificate, all->certificate);
+        EXPECT_EQ(each->coverage, all->coverage);
+        EXPECT_EQ(each->coverageOfAll, all->coverageOfAll);
+    }
+    Job job;
+    job.limits.maxMemoryBytes = 96 * 96 * 20;
+    const auto refused = selectViews(table, {}, job);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::invalidInput);
 }
 
 TEST(Selection, ViewsThatShareNothingAreAllKept) {

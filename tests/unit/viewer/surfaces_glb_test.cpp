@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <utility>
+
+#include "formats/files/file_spool.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
 #include "tests/small_bundle.hpp"
@@ -221,6 +225,37 @@ TEST(SurfacesGlb, IsReadBackAsTheSameSurfaces) {
     EXPECT_EQ(static_cast<std::int64_t>(mesh->triangles.size()), report->triangles);
     EXPECT_EQ(mesh->textures.size(), bundle.views.size());
     for (const glm::vec3& p : mesh->positions) EXPECT_LT(fromTorus(p), 0.01);
+}
+
+TEST(SurfacesGlb, IsTheSameFromASpool) {
+    const TemporaryFolder folder;
+    Job job;
+    for (const bool linear : {false, true}) {
+        Bundle bundle = torusViews(96);
+        if (linear) {
+            for (ReferenceView& view : bundle.views) {
+                RgbaFloatImage floats(view.camera.width, view.camera.height);
+                std::ranges::transform(view.texture.rgba8()->pixels(), floats.data(),
+                                       [](glm::u8vec4 c) { return glm::vec4(c) / 300.0f; });
+                view.texture = std::move(floats);
+            }
+        }
+        ASSERT_TRUE(writeSurfaces(folder.path() / "a.glb", bundle, {}, job));
+        auto spool = FileSpool::create(folder.path(), 1 << 20);
+        ASSERT_TRUE(spool);
+        for (ReferenceView& view : bundle.views) view.moveTo(spool->get());
+        SurfacesOptions options;
+        options.spool = spool->get();
+        // Its memory is not asked about.
+        job.limits.maxMemoryBytes = 1 << 20;
+        ASSERT_TRUE(
+            writeSurfaces(folder.path() / "b.glb", std::exchange(bundle, {}), options, job));
+        job.limits = {};
+        const auto a = readFile(folder.path() / "a.glb", Limits());
+        const auto b = readFile(folder.path() / "b.glb", Limits());
+        ASSERT_TRUE(a && b);
+        EXPECT_EQ(*a, *b);
+    }
 }
 
 /// A grey disc before a red wall.
