@@ -9,9 +9,6 @@
 namespace stx::behind {
 namespace {
 
-/// A pixel can be uncovered where its parallax is larger by this, in pixels, than the least around
-/// plus the way there. Half a pixel more than what drawing closes by itself.
-constexpr float kUncovered = 1.5f;
 /// Pixels that a nearer surface is within this many of have its colour in them (found on pictures
 /// of phones: 2 to 4).
 constexpr int kMixedPixels = 3;
@@ -26,8 +23,8 @@ float parallaxOf(float depth, float scale) {
     return hasPoint(depth) ? scale / depth : kNoParallax;
 }
 
-/// The least over all pixels of their parallax plus the way to them, for each pixel: two passes
-/// with steps of 1 and of the square root of 2 (Borgefors 1986).
+/// The least over all pixels of their parallax plus the way to them (kUncoveredWay), for each
+/// pixel: two passes with steps of 1 and of the square root of 2 (Borgefors 1986).
 Image<float> leastAround(const Image<float>& depth, float scale, NoDepth noDepth) {
     const int w = depth.width(), h = depth.height();
     // One sees past what is empty; what is not known says nothing.

@@ -1,6 +1,7 @@
 #include "lib/background/behind_draw.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -12,6 +13,10 @@ namespace {
 
 /// Pixels by which what is behind goes on under what is beside it, so that no crack is between.
 constexpr int kOverlap = 2;
+
+/// Pixels by which it goes on under what is before it: triangles end in the middles of pixels, and
+/// an eye that goes to the side turns.
+constexpr int kGrownPixels = 3;
 
 /// How much of the photograph's detail is put on the smooth colours: of the finest, and of what is
 /// coarser than a block. Invented detail is never where the true one is, so all of it costs a
@@ -50,29 +55,34 @@ struct Sample {
 Sample sampleAt(const Layer& layer, glm::ivec2 block, int x, int y) {
     const int step = layer.step;
     const std::size_t own = static_cast<std::size_t>(block.y) * layer.width() + block.x;
-    const float parallax = layer.parallax.data()[own], tolerance = surfaceTolerance(layer, own);
+    const float parallax = layer.parallax.data()[own];
+    // Between diagonal neighbours, and some more.
+    const float tolerance =
+        std::max(surfaceTolerance(layer, own), 2 * steepestBehind(layer) * parallax);
     if (step == 1) return {parallax, layer.colour.data()[own]};
     const float bx = (static_cast<float>(x) + 0.5f) / static_cast<float>(step) - 0.5f;
     const float by = (static_cast<float>(y) + 0.5f) / static_cast<float>(step) - 0.5f;
     const int x0 = static_cast<int>(std::floor(bx)), y0 = static_cast<int>(std::floor(by));
     const bool around = layer.part.data()[own] == Part::around;
-    float weights = 0, sum = 0;
+    float weights = 0, sum = 0, colourWeights = 0;
     glm::vec3 colours(0);
     for (int k = 0; k < 4; ++k) {
         const int u = x0 + k % 2, v = y0 + k / 2;
         if (!layer.part.contains(u, v)) continue;
         const Part part = layer.part.at(u, v);
-        if (part == Part::shown || (part == Part::around) != around) continue;
+        if (part == Part::shown) continue;
         const float there = layer.parallax.at(u, v);
         if (std::abs(there - parallax) > tolerance) continue;
         const float weight =
             (1 - std::abs(bx - static_cast<float>(u))) * (1 - std::abs(by - static_cast<float>(v)));
         weights += weight;
         sum += weight * there;
+        if ((part == Part::around) != around) continue;
+        colourWeights += weight;
         colours += weight * layer.colour.at(u, v);
     }
-    if (!(weights > 0)) return {parallax, layer.colour.data()[own]};
-    return {sum / weights, colours / weights};
+    return {weights > 0 ? sum / weights : parallax,
+            colourWeights > 0 ? colours / colourWeights : layer.colour.data()[own]};
 }
 
 /// The block that a pixel is drawn from; nothing where it is not drawn. Blocks around go on under
@@ -145,6 +155,31 @@ glm::vec3 detailAt(const Layer& layer, const Sources& sources, const ReferenceVi
 }
 
 }  // namespace
+
+void growUnder(Layer& layer, Sources& sources) {
+    constexpr std::array<glm::ivec2, 4> kBesideBlock = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+    const int rounds = (kGrownPixels + layer.step - 1) / layer.step;
+    for (int round = 0; round < rounds; ++round) {
+        const Image<Part> before = layer.part;
+        for (int y = layer.border.y; y < layer.border.y + layer.photo.y; ++y) {
+            for (int x = layer.border.x; x < layer.border.x + layer.photo.x; ++x) {
+                if (before.at(x, y) != Part::shown) continue;
+                for (const glm::ivec2 step : kBesideBlock) {
+                    const int u = x + step.x, v = y + step.y;
+                    if (!layer.inPhoto(u, v) || before.at(u, v) != Part::hidden ||
+                        !(layer.far.at(x, y) > layer.parallax.at(u, v)))
+                        continue;
+                    layer.part.at(x, y) = Part::hidden;
+                    layer.parallax.at(x, y) = layer.parallax.at(u, v);
+                    layer.colour.at(x, y) = layer.colour.at(u, v);
+                    const glm::ivec2 source = sources.at(u, v);
+                    sources.at(x, y) = source.x < 0 ? source : source - step;
+                    break;
+                }
+            }
+        }
+    }
+}
 
 std::int64_t drawBehind(const Layer& layer, const Sources& sources, const ReferenceView& photo,
                         double scale, ReferenceView& out) {

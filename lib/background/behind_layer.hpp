@@ -53,6 +53,17 @@ inline constexpr float kOneSurface = 2.0f;
 /// are never quite at one distance, and a crack between them would show.
 inline constexpr float kOneSurfaceOfJump = 0.25f;
 
+/// A pixel can be uncovered where its parallax is larger by this, in pixels, than the least around
+/// plus the way there.
+inline constexpr float kUncovered = 0.5f;
+
+/// How much the parallax of what is invented changes at most from one block to the next, share of
+/// it. Surface mode takes what changes by more than 0.005 from pixel to pixel for an edge unless it
+/// goes on so, from 0.03 on always, and leaves edges open.
+[[nodiscard]] inline float steepestBehind(const Layer& layer) {
+    return std::max(0.012f, 0.004f * static_cast<float>(layer.step));
+}
+
 /// How far parallaxes of neighbours may differ to be one surface, at this block.
 [[nodiscard]] inline float surfaceTolerance(const Layer& layer, std::size_t block) {
     if (layer.part.data()[block] != Part::hidden) return kOneSurface;
@@ -70,6 +81,11 @@ inline constexpr float kOneSurfaceOfJump = 0.25f;
 /// smooth. Blocks that nothing behind reaches become `shown`. Colours of mixed blocks are then the
 /// only other thing that is missing.
 void inventDepth(Layer& layer);
+
+/// The parallax of what is invented without steps, around the frame, too: nothing is behind them,
+/// so that they would open. Blocks of the photograph that are uncovered beside the frame become
+/// hidden.
+[[nodiscard]] Image<float> closeSteps(Layer& layer);
 
 /// Gives hidden and mixed blocks and those around a colour: the smoothest one that goes on what is
 /// beside them at their depth. Blocks that nothing at their depth reaches take the nearest farther

@@ -122,12 +122,16 @@ Result<BehindPhoto> behindPhoto(const ReferenceView& view, const BehindSettings&
     Layer layer = blocksOf(view, scale, step, frame.border, frame.size);
     STX_CHECK(job.checkCancelled());
     inventDepth(layer);
+    // Colours go by the depth that things have, drawn is what has no steps.
+    Image<float> closed = closeSteps(layer);
     STX_CHECK(job.checkCancelled());
     inventColour(layer);
     STX_CHECK(job.checkCancelled());
-    STX_TRY(const Sources sources, findSources(layer, job));
+    STX_TRY(Sources sources, findSources(layer, job));
     STX_CHECK(job.checkCancelled());
 
+    layer.parallax = std::move(closed);
+    growUnder(layer, sources);
     layer.far = {};
     layer.shown = {};
     BehindPhoto out;

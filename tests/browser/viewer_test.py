@@ -22,6 +22,19 @@ SIZE = "360x300"
 MODELS = {"spot": "spot_triangulated.obj", "fox": "Fox.gltf", "truck": "CesiumMilkTruck.gltf"}
 
 
+# The share of the pixels that have the background's colour, pure green.
+OPEN = """(() => {
+    const shown = document.querySelector('canvas'), copy = document.createElement('canvas');
+    [copy.width, copy.height] = [shown.width, shown.height];
+    const context = copy.getContext('2d');
+    context.drawImage(shown, 0, 0);
+    const p = context.getImageData(0, 0, copy.width, copy.height).data;
+    let open = 0;
+    for (let i = 0; i < p.length; i += 4) open += p[i] === 0 && p[i + 1] === 255 && p[i + 2] === 0;
+    return open / (p.length / 4);
+})()"""
+
+
 def find_model(shared, name):
     """A model by its file's name, wherever it lies below the shared meshes, and not packed by Draco."""
     for root, _, names in sorted(os.walk(os.path.join(shared, "data/meshes"))):
@@ -177,6 +190,25 @@ def single(test, browser):
     test.check(browser.ask("JSON.stringify(viewer.camera.eye)") == eye, "all from where the eye is")
 
 
+def photo(test, browser):
+    """A photograph with what is behind it: hardly anything of its frame is open when the eye goes 5 or 8 % of the distance to a
+    side. (One layer is behind it: what that hides in turn, beside a cone before a box, stays open.)"""
+    file = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../samples/photos/solids_gdepth.jpg")
+    test.stx_run("convert", file, "-o", "photo.mp4")
+    test.stx_run("extract", "photo.mp4", "-o", "photo.html")
+    show(browser, test.path("photo.html"), "")
+    eye, target, fov = json.loads(browser.ask("JSON.stringify([viewer.data.start.eye, viewer.data.start.target, viewer.data.start.fov])"))
+    distance = math.dist(eye, target)
+    for percent, most in ((5, 2e-4), (8, 6e-4)):
+        share = 0
+        for side, up in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            moved = (eye[0] + side * percent / 100 * distance, eye[1] + up * percent / 100 * distance, eye[2])
+            show(browser, test.path("photo.html"), f"eye={','.join(map(str, moved))}&target={','.join(map(str, target))}&fov={fov}"
+                                                   "&size=400x300&ui=off&background=%2300ff00")
+            share += browser.ask(OPEN) / 4
+        test.check(share <= most, f"from beside by {percent} %: {100 * share:.4f} % of the page is open")
+
+
 def odd_addresses(test, browser):
     """What codes nothing is passed over; nothing that the page does is against its own policy."""
     for address in ("%", "eye=%E0%A4%A&fov=%", "eye=1,2&up=x&=&&"):
@@ -238,6 +270,7 @@ def main():
             models(test, browser, args)
             touched(test, browser)
             single(test, browser)
+            photo(test, browser)
             odd_addresses(test, browser)
             phone(test, browser)
             test.check(not browser.faults, f"no fault is logged: {browser.faults[:3]}")

@@ -228,5 +228,35 @@ TEST(RaiseDepth, SmallStepsStaySlopes) {
                 << x << " " << y;
 }
 
+// Beside an edge some pixels of a wall lie between samples and others on a plane; where they met
+// there were steps, at which renderers cut the wall.
+TEST(RaiseDepth, OneSurfaceHasNoSmallSteps) {
+    Image<float> depth(30, 20);
+    for (int y = 0; y < 20; ++y)
+        for (int x = 0; x < 30; ++x) {
+            const double bend = 0.016 * std::sin(0.9 * x + 0.5 * y);
+            depth.at(x, y) = x < 12 + y % 3 ? 1.0f : static_cast<float>(2 / (1 + bend + 0.003 * y));
+        }
+    Rgba8Image picture(150, 100);
+    for (int y = 0; y < 100; ++y)
+        for (int x = 0; x < 150; ++x)
+            picture.at(x, y) =
+                x < 62 ? glm::u8vec4(180, 140, 120, 255) : glm::u8vec4(90, 90, 90, 255);
+    const Image<float> raised = raiseDepth(depth, Texture(std::move(picture)));
+    int edges = 0, small = 0;
+    const auto count = [&](float a, float b) {
+        const float step = std::abs(a - b) / std::max(a, b);
+        edges += step > 0.3f;
+        small += step > 0.005f && step < 0.02f;
+    };
+    for (int y = 1; y < 100; ++y)
+        for (int x = 1; x < 150; ++x) {
+            count(raised.at(x, y), raised.at(x - 1, y));
+            count(raised.at(x, y), raised.at(x, y - 1));
+        }
+    EXPECT_GT(edges, 90);
+    EXPECT_EQ(small, 0);
+}
+
 }  // namespace
 }  // namespace stx
