@@ -269,7 +269,9 @@ std::uint64_t memoryOfOne(const ViewTable& table, std::size_t index, const PeakM
     return std::max(table.bytesToMake(index), table.bytesGiven(index) + working);
 }
 
-std::uint64_t mostAtOnce(const ViewTable& table) {
+std::uint64_t mostAtOnce(const ViewTable& table, const PeakMemory& work) {
+    for (std::size_t i = 0; work.oneByOneFrom > 0 && i < table.count(); ++i)
+        if (table.pixelsOf(i) >= work.oneByOneFrom) return 1;
     const auto threads = static_cast<std::uint64_t>(threadCount());
     return table.mostAtOnce() > 0
                ? std::min(threads, static_cast<std::uint64_t>(table.mostAtOnce()))
@@ -282,7 +284,8 @@ std::uint64_t memoryOfEach(const ViewTable& table, const PeakMemory& work) {
     std::uint64_t most = 0;
     for (std::size_t i = 0; i < table.count(); ++i)
         most = std::max(most, memoryOfOne(table, i, work));
-    return table.bytesHeld() + most * std::min<std::uint64_t>(mostAtOnce(table), table.count());
+    return table.bytesHeld() +
+           most * std::min<std::uint64_t>(mostAtOnce(table, work), table.count());
 }
 
 std::uint64_t memoryOfAll(const ViewTable& table, const PeakMemory& work) {
@@ -308,7 +311,7 @@ Result<void> forEachView(
         most = std::max(most, takes);
     }
     const auto room = (job.limits.maxMemoryBytes - held) / most;
-    const std::uint64_t atOnce = std::clamp<std::uint64_t>(room, 1, mostAtOnce(table));
+    const std::uint64_t atOnce = std::clamp<std::uint64_t>(room, 1, mostAtOnce(table, work));
     for (std::size_t first = 0; first < count; first += atOnce) {
         const std::size_t end = std::min<std::size_t>(first + atOnce, count);
         std::vector<Result<void>> done(end - first);

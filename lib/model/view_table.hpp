@@ -143,11 +143,12 @@ struct ViewChange {
 [[nodiscard]] std::uint64_t memoryOfAll(const ViewTable& table, const PeakMemory& work);
 
 /// Goes through all views, in rounds of as many at a time as there are threads and as the memory
-/// limit has room for: `each` is called with a view from several threads, then `inOrder`, if any,
-/// for the views of the round one after the other, in their order. Views are given back after their
-/// `each`, unless it keeps them. `work` is what `each` and `inOrder` take beside one view.
-/// Errors: (invalidInput) before the first view is read, one view takes more than the limit; those
-/// of view(), of `each` and of `inOrder`, the first by number; cancelled.
+/// limit has room for (one where PeakMemory::oneByOneFrom says so): `each` is called with a view
+/// from several threads, then `inOrder`, if any, for the views of the round one after the other, in
+/// their order. Views are given back after their `each`, unless it keeps them. `work` is what
+/// `each` and `inOrder` take beside one view. Errors: (invalidInput) before the first view is read,
+/// one view takes more than the limit; those of view(), of `each` and of `inOrder`, the first by
+/// number; cancelled.
 [[nodiscard]] Result<void> forEachView(
     const ViewTable& table, const PeakMemory& work, Job& job,
     const std::function<Result<void>(std::size_t index, std::shared_ptr<const ReferenceView> view)>&
