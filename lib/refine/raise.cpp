@@ -10,6 +10,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
+#include "lib/refine/raise_specks.hpp"
 #include "lib/refine/raise_surfaces.hpp"
 
 namespace stx {
@@ -265,6 +266,7 @@ Image<float> raiseDepth(const Image<float>& depth, const Texture& picture,
         for (int y = from; y < to; ++y)
             for (int x = 0; x < width; ++x) out.at(x, y) = strip.depthAt(x, y);
     });
+    joinSpecks(out, picture, 1.0 * width / depth.width());
     smoothSmallSteps(out, std::max(1, width / depth.width()));
     return out;
 }
