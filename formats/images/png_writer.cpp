@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <string_view>
 #include <vector>
 
@@ -17,6 +18,9 @@ namespace stx {
 namespace {
 
 using Row = std::vector<std::uint8_t>;
+
+/// Bytes after those of the pixels: a checksum, and the chunk IEND.
+constexpr std::size_t kEnd = 16;
 
 /// The filter Paeth (clause 9.4). In bytes and without a branch, so that compilers make vectors of
 /// it.
@@ -177,18 +181,19 @@ Result<Bytes> encodeWholePng(int width, int height, int channels, int bits, cons
         png.end();
     }
     png.begin("IDAT");
-    Bytes& out = png.bytes();
-    const std::size_t at = out.size();
-    out.resize(at + zlibBound(rows.size()));
+    // As large as it may become, but memory is taken only for what is written.
+    const std::size_t most = zlibBound(rows.size());
+    const auto packed = std::make_unique_for_overwrite<std::byte[]>(most);
     const std::size_t size =
-        compressZlib(std::as_bytes(std::span(rows)), level, std::span(out).subspan(at));
+        compressZlib(std::as_bytes(std::span(rows)), level, std::span(packed.get(), most));
     if (size == 0)
         return fail(ErrorCode::failed, "cannot encode a PNG of {}x{} pixels", width, height);
-    out.resize(at + size);
+    Bytes& out = png.bytes();
+    out.reserve(out.size() + size + kEnd);
+    out.insert(out.end(), packed.get(), packed.get() + size);
     png.end();
     png.begin("IEND");
     png.end();
-    out.shrink_to_fit();
     return std::move(out);
 }
 
