@@ -48,6 +48,22 @@ TEST_F(DistinctPages, AnOctahedralGridHasItsBorderTwice) {
     EXPECT_EQ(set->distinct().views().size(), 9u);
 }
 
+/// What is transparent in an atlas has the colours of what is beside it in the page.
+TEST_F(DistinctPages, ColoursThatDoNotShowAreNotCompared) {
+    const Bundle grid = torusViews(48, glm::dvec3(0), {ViewLayout::Kind::octahedral, 4, 0});
+    auto atlas = pack(grid, {}, job);
+    ASSERT_TRUE(atlas);
+    for (AtlasPage& page : atlas->pages) {
+        Rgba8Image& pixels = *page.texture.rgba8();
+        for (std::size_t i = 0; i < pixels.count(); ++i)
+            if (pixels.data()[i].a == 0)
+                pixels.data()[i] = glm::u8vec4(i % 251, i % 241, i % 239, 0);
+    }
+    const auto set = PageSet::of(*atlas, job);
+    ASSERT_TRUE(set);
+    EXPECT_EQ(set->distinct().views().size(), 9u);
+}
+
 TEST_F(DistinctPages, AnotherPictureOfTheSameCameraStays) {
     Bundle more = views;
     more.views.push_back(more.views[0]);
