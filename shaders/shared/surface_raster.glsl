@@ -18,7 +18,8 @@ vec4 cornerAt(float x, float y, float q) {
 // range, inside a box.
 void scan(vec4 ex, vec4 ey, vec4 e0, vec3 plane, float qMin, float qMax, vec2 low, vec2 high, uint flags) {
     // What is behind it by so much is another surface.
-    float behind = (flags & kCoversBit) != 0u ? qMin - kLinkedSamples * relativeScale(frameAxis(), qMin) : 0.0f;
+    float apart = (flags & kRimBit) != 0u ? kBehindRim : kLinkedSamples;
+    float behind = (flags & kCoversBit) != 0u ? qMin - apart * relativeScale(frameAxis(), qMin) : 0.0f;
     vec2 from = max(low, vec2(0.0f)), to = min(high, vec2(float(SIDE - 1)));
     if (!(from.x <= to.x && from.y <= to.y) || !(qMin > 0.0f) || !(qMax <= qLimit())) return;
     ivec2 first = ivec2(ceil(from)), last = ivec2(floor(to));
@@ -90,5 +91,5 @@ void drawExtension(float x, float y, float q, float gx, float gy, float scale, b
     float minus = clamp(gx * side - gy * side, -reach, reach);
     fillQuad(cornerAt(x - side, y - side, q - plus), cornerAt(x + side, y - side, q + minus),
              cornerAt(x + side, y + side, q + plus), cornerAt(x - side, y + side, q - minus), kCrack,
-             kExtensionBit | kNearEdgeBit | (covers ? kCoversBit : 0u));
+             kExtensionBit | kNearEdgeBit | (covers ? kCoversBit : 0u) | (rim ? kRimBit : 0u));
 }

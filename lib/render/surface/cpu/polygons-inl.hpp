@@ -207,9 +207,12 @@ HWY_INLINE void addPlanes(const Target& t, const Polygons& p, const Diagonals& g
     out.flags = hn::And(p.flags, hn::Set(du, std::uint32_t{kSampleFlags}));
     out.behind = hn::Zero(d);
     if (extend) {
-        const auto covers = hn::RebindMask(
-            d, hn::Ne(hn::And(p.flags, hn::Set(du, std::uint32_t{kCoversBit})), hn::Zero(du)));
-        const Floats apart = hn::Set(d, kLinkedSamples);
+        const auto flagged = [&](std::uint32_t bit) HWY_ATTR {
+            return hn::RebindMask(d, hn::TestBit(p.flags, hn::Set(du, bit)));
+        };
+        const auto covers = flagged(kCoversBit);
+        const Floats apart =
+            hn::IfThenElse(flagged(kRimBit), hn::Set(d, kBehindRim), hn::Set(d, kLinkedSamples));
         out.behind = hn::IfThenElseZero(
             covers, hn::Sub(out.low, t.inverse ? hn::Mul(apart, out.low) : apart));
     }

@@ -303,7 +303,8 @@ HWY_NOINLINE void drawExtensions(Target& t, const Source& s, const Warp& warp,
             const bool rim = block.rims[static_cast<std::size_t>(j)] >> i & 1;
             const bool covers =
                 (outside || rim) && std::abs(g.x) + std::abs(g.y) < kExtensionCovers * scale;
-            flags[count] = kExtensionBit | kNearEdgeBit | (covers ? kCoversBit : 0u);
+            flags[count] =
+                kExtensionBit | kNearEdgeBit | (covers ? kCoversBit : 0u) | (rim ? kRimBit : 0u);
             if (++count == n) flush();
         }
     }

@@ -9,7 +9,8 @@ namespace stx::surface {
 namespace {
 
 // Chosen on one view of each of five pairs of Middlebury, drawn at the other's place (dB of Y, in
-// the order Books, Dolls, Laundry, Cones, Teddy; without rims 31.18, 34.11, 31.00, 31.23, 33.73).
+// the order Books, Dolls, Laundry, Cones, Teddy; without rims 31.18, 34.11, 31.00, 31.23, 33.73),
+// before kBehindRim was less than kLinkedSamples.
 
 /// A pixel belongs to the front by this share at least: 0.5, 0.8, 0.9 and 0.97 give 31.17, 33.94,
 /// 30.83, 31.48, 34.23; 31.15, 34.04, 30.90, 31.53, 34.17; 31.15, 34.08, 30.94, 31.52, 34.08; and
