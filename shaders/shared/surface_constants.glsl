@@ -27,8 +27,8 @@ CONSTANT float kExtensionReach = 0.02f;
 // An extension beside background is drawn over what its source shows behind it (by kLinkedSamples), so that faces
 // that views see one by one meet at their edge. Not where its q changes by this share over its half side: there
 // what turns away ends sooner. Of 121 random cases 0.002, 0.006 and 0.02 raise the mean by 0.03, 0.04 and 0.04 dB,
-// the last with a torus 0.9 dB worse; over all inner edges, too, spheres-miv loses 0.3 dB: of these only rims of
-// captured views do (rims.hpp).
+// the last with a torus 0.9 dB worse; over all inner edges, too, spheres-miv loses 0.3 dB: of these only rims of a
+// view that is alone do (rims.hpp).
 CONSTANT float kExtensionCovers = 0.006f;
 
 // Fusing them.
@@ -78,7 +78,7 @@ CONSTANT uint kExtensionBit = 1u, kNearEdgeBit = 2u, kSampleFlags = 3u;
 CONSTANT uint kCoversBit = 4u;
 // And they are rims (rims.hpp): what is behind them by this share is another surface, since pixels of one surface
 // are linked up to 0.005. 0.03 (kLinkedSamples), 0.015, 0.006 and 0.003 give 30.95, 31.14, 31.40 and 31.40 dB of Laundry
-// and 34.08, 34.04, 34.03 and 34.03 of Dolls; Books, Cones, Teddy and open3d-rgbd stay.
+// and 34.08, 34.04, 34.03 and 34.03 of Dolls; Books, Cones and Teddy stay.
 CONSTANT uint kRimBit = 8u;
 CONSTANT float kBehindRim = 0.006f;
 // In the mean of what all sources of a tile show and what the first of them do, the first answer counts this

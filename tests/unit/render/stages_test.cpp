@@ -78,6 +78,9 @@ std::vector<Shot> shots() {
     for (ReferenceView& view : apart.bundle.views) view.noDepth = NoDepth::unknown;
     for (float& depth : apart.bundle.views[1].depth.pixels()) depth *= 1.008f;
     all.push_back(apart);
+    Shot alone = ofRoom();
+    alone.bundle.views.resize(1);
+    all.push_back(alone);
     return all;
 }
 

@@ -53,7 +53,7 @@ TEST(Rims, ArePixelsWithoutTheColourOfWhatIsBehind) {
     EXPECT_FALSE(isRimPixel(SurfaceScene(bundle, without), kPlateEnd - 1, kPlateSide / 2));
 }
 
-TEST(Rims, OfSeveralExactViewsAreLeftToTheOtherViews) {
+TEST(Rims, OfSeveralViewsAreLeftToTheOthers) {
     Bundle bundle = plateBeforeWall(kPlateGrey);
     bundle.views.push_back(bundle.views[0]);
     bundle.views[1].camera.position.x += 1;

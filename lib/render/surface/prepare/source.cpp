@@ -371,8 +371,8 @@ void SurfaceScene::prepare(const RenderSettings& settings) {
     blends = settings.does(Stage::blend) && std::ranges::any_of(sources, [](const Source& s) {
                  return disagree(s.view->refined);
              });
-    // Of several exact views the others know better where what is in front ends.
-    const bool rims = settings.does(Stage::rims) && (sources.size() < 2 || blends);
+    // Of several views the others know better where what is in front ends.
+    const bool rims = settings.does(Stage::rims) && sources.size() < 2;
     const bool whole = std::ranges::all_of(sources, [](const Source& s) { return s.view->whole; });
     if (whole) {
         parallelFor(0, static_cast<std::int64_t>(sources.size()), [&](std::int64_t i) {
