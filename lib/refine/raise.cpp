@@ -30,6 +30,9 @@ constexpr int kStripRows = 128, kMarginRows = 16;
 /// together with what is around them within a sample.
 constexpr float kSmallStep = 0.003f, kLargestSmallStep = 0.012f;
 
+/// Steps to the pixels to the right, left, below and above.
+constexpr int kBeside[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+
 using PerSurface = std::array<float, kRaisedSurfaces>;
 
 /// A pixel at an edge.
@@ -123,10 +126,9 @@ class RaisedStrip {
 
     /// Finds the neighbours of a pixel; of those on one surface it hears at once.
     void link(RaisedPixel& pixel) {
-        static constexpr int kWays[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
         const glm::vec3 own(picture_.at(pixel.x, pixel.y));
         for (std::size_t way = 0; way < 4; ++way) {
-            const int x = pixel.x + kWays[way][0], y = pixel.y + kWays[way][1];
+            const int x = pixel.x + kBeside[way][0], y = pixel.y + kBeside[way][1];
             if (!index_.contains(x, y - top_)) continue;
             const glm::vec3 unlike = glm::vec3(picture_.at(x, y)) - own;
             pixel.apart[way] = kApart * (kApartAnyway + std::exp(-glm::dot(unlike, unlike) /
@@ -185,8 +187,6 @@ class RaisedStrip {
     Image<float> inverse_;  ///< 1/z; 0: no depth
     std::vector<RaisedPixel> pixels_;
 };
-
-constexpr int kBeside[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
 
 /// By how much two distances or two of their inverses differ, share of the larger.
 float shareApart(float a, float b) {

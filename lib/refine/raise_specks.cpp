@@ -124,7 +124,7 @@ class Specks {
 
     Image<float>& depth_;
     const Texture& picture_;
-    const std::size_t fewest_;  ///< pixels of a part that is no speck
+    const std::size_t fewest_;  ///< pixels of a part that is not a speck
     Image<std::uint8_t> kind_;
     std::vector<glm::ivec2> edges_;
 };
