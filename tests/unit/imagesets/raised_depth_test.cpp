@@ -136,7 +136,8 @@ double shareOff(const ReducedSet& set, const Image<float>& depth, const Image<fl
     return 1.0 * off / count;
 }
 
-/// Decibels of what a view shows of another picture of the set.
+/// Decibels of what a view shows of another picture of the set. Drawn without `rims`, which make
+/// up for edges of depth that lie wrong.
 double decibelsFrom(const ReducedSet& set, const ReferenceView& view, int number,
                     const std::filesystem::path& folder) {
     Job job;
@@ -144,6 +145,7 @@ double decibelsFrom(const ReducedSet& set, const ReferenceView& view, int number
     bundle.views = {view};
     RenderSettings settings;
     settings.fill = Fill::none;
+    settings.without.add(Stage::rims);
     auto renderer = makeRenderer(Backend::cpu, bundle, settings, -1, job);
     if (!renderer) {
         ADD_FAILURE() << renderer.error().text();
@@ -216,11 +218,11 @@ TEST(RaisedDepth, EdgesOfBooksAre) {
     edgesAreNearer({"middlebury2005-books", 1.0 / 3, 200, 3, {5}}, 0.4, 0.4);
 }
 TEST(RaisedDepth, EdgesOfDollsAre) {
-    edgesAreNearer({"middlebury2005-dolls", 1.0 / 3, 200, 3, {5}}, 0.5, 0.6);
+    edgesAreNearer({"middlebury2005-dolls", 1.0 / 3, 200, 3, {5}}, 0.5, 0.8);
 }
 // Bars of two pixels, which are lost in the reduced depth, leave nothing to gain in decibels.
 TEST(RaisedDepth, EdgesOfLaundryAre) {
-    edgesAreNearer({"middlebury2005-laundry", 1.0 / 3, 230, 3, {5}}, 0.5, -1.1);
+    edgesAreNearer({"middlebury2005-laundry", 1.0 / 3, 230, 3, {5}}, 0.5, -0.7);
 }
 
 }  // namespace stx

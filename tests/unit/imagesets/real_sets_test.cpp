@@ -49,11 +49,12 @@ double share(const Image<std::uint8_t>& mask) {
 /// One reference view drawn from another camera, compared with what was photographed there.
 /// The naive warp is that of `asStored`, the same view as the set has it.
 Warped warp(const ReferenceView& asStored, const ReferenceView& from, const Camera& to,
-            const Rgba8Image& truth) {
+            const Rgba8Image& truth, StageSet without = {}) {
     Job job;
     Bundle bundle;
     bundle.views.push_back(from);
     RenderSettings settings;
+    settings.without = without;
     settings.fill = Fill::none;
     auto renderer = makeRenderer(Backend::cpu, bundle, settings, -1, job);
     if (!renderer) ADD_FAILURE() << renderer.error().text();
@@ -197,7 +198,7 @@ TEST(OlderMiddlebury, PairsThatLieBesideEachOtherAreAligned) {
         double scale, better;
     };
     for (const Set& of : {Set{"2005-books", 3, 0.7}, Set{"2005-dolls", 3, 0.45},
-                          Set{"2005-laundry", 3, 0.65}, Set{"2003-cones", 4, 0.03}}) {
+                          Set{"2005-laundry", 3, 0.85}, Set{"2003-cones", 4, 0.03}}) {
         REQUIRE_SHARED(set, fmt::format("data/imagesets/middlebury{}", of.name));
         ImageSetOptions options;
         options.focal = 1000;
@@ -213,7 +214,10 @@ TEST(OlderMiddlebury, PairsThatLieBesideEachOtherAreAligned) {
         EXPECT_EQ(aligned->views[0].camera.cy, asStored->views[0].camera.cy);
         const Rgba8Image truth = *asStored->views[1].texture.rgba8();
         const auto psnrOf = [&](const Bundle& b) {
-            return warp(asStored->views[0], b.views[0], b.views[1].camera, truth).psnr;
+            // Rims make up for a part of it.
+            StageSet rims;
+            rims.add(Stage::rims);
+            return warp(asStored->views[0], b.views[0], b.views[1].camera, truth, rims).psnr;
         };
         const double now = psnrOf(*aligned), before = psnrOf(*asStored);
         std::printf("  %s: %.2f dB, as stored %.2f dB\n", of.name, now, before);
