@@ -16,8 +16,11 @@ namespace stx::tools {
 namespace {
 
 std::atomic<int> signalThatCame = 0;
+std::atomic<bool> watching = false;
 
 void watch(sigset_t signals, std::atomic<bool>& cancelled, int patienceMs) {
+    watching = true;
+    watching.notify_one();
     int signal = 0;
     while (sigwait(&signals, &signal) != 0) {
     }
@@ -50,8 +53,12 @@ bool watchStopSignals(std::atomic<bool>& cancelled, int patienceMs) {
         if (now.sa_handler != SIG_IGN) sigaddset(&signals, signal);
     }
     pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+    watching = false;
     try {
         std::thread(watch, signals, std::ref(cancelled), patienceMs).detach();
+        // A thread that is still being made holds locks of the C library or of a sanitizer. A fork()
+        // at that moment would leave them locked in the copy for good.
+        watching.wait(false);
         return true;
     } catch (const std::system_error&) {
         pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
