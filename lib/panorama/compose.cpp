@@ -16,6 +16,20 @@ using namespace panorama;
 
 namespace {
 
+/// A picture is reduced before it is drawn where so many of its pixels and more are one of the
+/// panorama, and its filter is widened where they still are more than this.
+constexpr double kReducedFrom = 1.5, kWidenedFrom = 1.05;
+/// Cells around a footprint in which it is drawn, and with which rows are looked for: beyond the
+/// two by which labels go on, for rounding.
+constexpr int kAroundDrawn = 2, kAroundRows = 3;
+/// Pixels that pictures cover by less than this stay empty.
+constexpr float kLeastCoverage = 1e-3f;
+/// A panorama of its natural width has at least so many pixels, and a multiple of these.
+constexpr double kLeastWidth = 64;
+constexpr int kWidthStep = 4;
+/// The share of the memory that sums of a band of rows may take is one over this.
+constexpr std::uint64_t kBandShare = 4;
+
 /// A picture that is drawn with a cubic filter as wide as the distance of the panorama's pixels.
 class Drawn {
   public:
@@ -23,12 +37,12 @@ class Drawn {
         : lens_(lens) {
         // Pixels of the picture for each of the panorama, in the middle.
         double scale = camera.focal * 2 * M_PI / width;
-        const int less = std::max(1, static_cast<int>(scale / 1.5));
+        const int less = std::max(1, static_cast<int>(scale / kReducedFrom));
         copy_ = makeWorkCopy(std::move(picture),
                              less > 1 ? std::max(1, std::max(camera.size.x, camera.size.y) / less)
                                       : std::max(camera.size.x, camera.size.y));
         scale = std::max(1.0, scale * copy_.colour.width() / camera.size.x);
-        wide_ = scale > 1.05 ? static_cast<float>(scale) : 1.0f;
+        wide_ = scale > kWidenedFrom ? static_cast<float>(scale) : 1.0f;
         worldFromCamera_ = glm::mat3_cast(camera.worldFromCamera);
     }
 
@@ -61,6 +75,7 @@ class Drawn {
     }
 
   private:
+    /// Catmull and Rom's kernel.
     static float cubic(float t) {
         t = std::abs(t);
         if (t < 1) return (1.5f * t - 2.5f) * t * t + 1;
@@ -146,15 +161,16 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
           int width, int top, Image<glm::vec4>& sums) {
     const int gridWidth = labels.width();
     const double cells = static_cast<double>(gridWidth) / width;
-    const int first = std::max(top, static_cast<int>((print.box.y - 2) / cells));
-    const int last = std::min(top + sums.height(),
-                              static_cast<int>((print.box.y + print.box.height + 2) / cells) + 1);
+    const int first = std::max(top, static_cast<int>((print.box.y - kAroundDrawn) / cells));
+    const int last =
+        std::min(top + sums.height(),
+                 static_cast<int>((print.box.y + print.box.height + kAroundDrawn) / cells) + 1);
     const bool all = print.box.width >= gridWidth;
-    const int left = all ? 0 : static_cast<int>(std::floor((print.box.x - 2) / cells));
+    const int left = all ? 0 : static_cast<int>(std::floor((print.box.x - kAroundDrawn) / cells));
     const int right =
         all ? width
-            : std::min(left + width,
-                       static_cast<int>(std::ceil((print.box.x + print.box.width + 2) / cells)));
+            : std::min(left + width, static_cast<int>(std::ceil(
+                                         (print.box.x + print.box.width + kAroundDrawn) / cells)));
     // Sine and cosine of each column's longitude.
     std::vector<glm::dvec2> turns;
     for (int x = left; x < right; ++x) {
@@ -243,8 +259,8 @@ int naturalWidth(const PanoramaAlignment& alignment) {
     double focal = 0;
     for (const PanoramaCamera& camera : alignment.cameras)
         if (camera.used) focal = std::max(focal, camera.focal);
-    const double width = std::clamp(2 * M_PI * focal, 64.0, double{kMaxPanoramaWidth});
-    return static_cast<int>(width) / 4 * 4;
+    const double width = std::clamp(2 * M_PI * focal, kLeastWidth, double{kMaxPanoramaWidth});
+    return static_cast<int>(width) / kWidthStep * kWidthStep;
 }
 
 Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& alignment,
@@ -255,7 +271,7 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
                     "a panorama of {} pixels in width; an even number is expected", width);
     const int height = width / 2;
     const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-    STX_CHECK(job.limits.checkAllocation(pixels, 8, "the panorama"));
+    STX_CHECK(job.limits.checkAllocation(pixels, 2 * sizeof(glm::u8vec4), "the panorama"));
     const int gridWidth = gridWidthFor(alignment, width);
     STX_TRY(auto prints, footprintsOf(source, alignment, gridWidth, job));
     alignment.vignetting = findVignetting(prints, gridWidth);
@@ -267,16 +283,15 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
     const auto corrections = findCorrections(prints, gains, labels);
 
     PanoramaImage out{Rgba8Image(width, height)};
-    // Sums of a band of rows share a quarter of the memory.
     const auto rowBytes = static_cast<std::uint64_t>(width) * sizeof(glm::vec4);
     const int band = static_cast<int>(std::clamp<std::uint64_t>(
-        job.limits.maxMemoryBytes / 4 / rowBytes, 1, static_cast<std::uint64_t>(height)));
+        job.limits.maxMemoryBytes / kBandShare / rowBytes, 1, static_cast<std::uint64_t>(height)));
     // Rows that some picture reaches.
     const double cells = static_cast<double>(gridWidth) / width;
     int first = height, last = 0;
     for (const Footprint& f : prints) {
-        first = std::min(first, static_cast<int>((f.box.y - 3) / cells));
-        last = std::max(last, static_cast<int>((f.box.y + f.box.height + 3) / cells) + 1);
+        first = std::min(first, static_cast<int>((f.box.y - kAroundRows) / cells));
+        last = std::max(last, static_cast<int>((f.box.y + f.box.height + kAroundRows) / cells) + 1);
     }
     first = std::max(first, 0);
     last = std::min(last, height);
@@ -284,8 +299,9 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
     std::int64_t done = 0;
     for (int top = first; top < last; top += band) {
         Image<glm::vec4> sums(width, std::min(band, last - top), glm::vec4(0));
-        const double from = static_cast<double>(top) * gridWidth / width - 3;
-        const double to = static_cast<double>(top + sums.height()) * gridWidth / width + 3;
+        const double from = static_cast<double>(top) * gridWidth / width - kAroundRows;
+        const double to =
+            static_cast<double>(top + sums.height()) * gridWidth / width + kAroundRows;
         for (std::size_t k = 0; k < prints.size(); ++k) {
             STX_CHECK(job.checkCancelled());
             job.progress(++done, bands * static_cast<std::int64_t>(prints.size()), "drawing");
@@ -306,7 +322,7 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
             const auto toRow = out.pixels.row(top + static_cast<int>(y));
             for (std::size_t x = 0; x < toRow.size(); ++x) {
                 const glm::vec4 s = fromRow[x];
-                if (s.a <= 1e-3f) continue;
+                if (s.a <= kLeastCoverage) continue;
                 const glm::vec3 c = glm::vec3(s) / s.a;
                 toRow[x] = {tables.code(c.r), tables.code(c.g), tables.code(c.b),
                             static_cast<std::uint8_t>(std::min(1.0f, s.a) * 255.0f + 0.5f)};
