@@ -297,8 +297,7 @@ Result<int> checkCameraOptions(const CameraOptions& options, const Command& comm
                                              sways         ? "--sway"
                                              : o.view >= 0 ? "--view"
                                                            : "--cameras")));
-    if (own || isPose(o))
-        STX_CHECK(command.refuse({"--elevation"}, "is of --orbit"));
+    if (own || isPose(o)) STX_CHECK(command.refuse({"--elevation"}, "is of --orbit"));
     if (o.orbit == 0) STX_CHECK(command.refuse({"--radius", "--start", "--arc"}, "is of --orbit"));
     if (o.cameraFile.empty())
         STX_CHECK(command.refuse({"--dataparser"}, "is of --cameras camera_path.json"));
