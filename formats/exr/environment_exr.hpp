@@ -2,8 +2,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "formats/exr/exr_file.hpp"
