@@ -1,7 +1,6 @@
 #include "lib/background/behind_draw.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -14,19 +13,15 @@ namespace {
 /// Pixels by which what is behind goes on under what is beside it, so that no crack is between.
 constexpr int kOverlap = 2;
 
-/// Pixels by which it goes on under what is before it: triangles end in the middles of pixels, and
-/// an eye that goes to the side turns.
-constexpr int kGrownPixels = 3;
-
 /// How much of the photograph's detail is put on the smooth colours: of the finest, and of what is
 /// coarser than a block. Invented detail is never where the true one is, so all of it costs a
-/// decibel; of aloe (view 1 alone, views 3 and 5 the truth) 1.05 and 0.6 keep 0.6 of the truth's
+/// decibel; of aloe (view 1 alone, views 3 and 5 the truth) 1.07 and 0.61 keep 0.6 of the truth's
 /// gradient energy and more, at the SSIM and within 0.1 dB of smooth colours. Around the frame,
 /// where there is nothing on the other side to fit it to, 1 and 0.4 are as near as smooth colours.
 struct Detail {
     float fine, coarse;
 };
-constexpr Detail kHiddenDetail = {1.05f, 0.6f}, kAroundDetail = {1.0f, 0.4f};
+constexpr Detail kHiddenDetail = {1.07f, 0.61f}, kAroundDetail = {1.0f, 0.4f};
 
 /// The blocks of which pixels are drawn: hidden ones and those around, and kOverlap pixels beside.
 Image<std::uint8_t> drawnBlocks(const Layer& layer) {
@@ -155,31 +150,6 @@ glm::vec3 detailAt(const Layer& layer, const Sources& sources, const ReferenceVi
 }
 
 }  // namespace
-
-void growUnder(Layer& layer, Sources& sources) {
-    constexpr std::array<glm::ivec2, 4> kBesideBlock = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
-    const int rounds = (kGrownPixels + layer.step - 1) / layer.step;
-    for (int round = 0; round < rounds; ++round) {
-        const Image<Part> before = layer.part;
-        for (int y = layer.border.y; y < layer.border.y + layer.photo.y; ++y) {
-            for (int x = layer.border.x; x < layer.border.x + layer.photo.x; ++x) {
-                if (before.at(x, y) != Part::shown) continue;
-                for (const glm::ivec2 step : kBesideBlock) {
-                    const int u = x + step.x, v = y + step.y;
-                    if (!layer.inPhoto(u, v) || before.at(u, v) != Part::hidden ||
-                        !(layer.far.at(x, y) > layer.parallax.at(u, v)))
-                        continue;
-                    layer.part.at(x, y) = Part::hidden;
-                    layer.parallax.at(x, y) = layer.parallax.at(u, v);
-                    layer.colour.at(x, y) = layer.colour.at(u, v);
-                    const glm::ivec2 source = sources.at(u, v);
-                    sources.at(x, y) = source.x < 0 ? source : source - step;
-                    break;
-                }
-            }
-        }
-    }
-}
 
 std::int64_t drawBehind(const Layer& layer, const Sources& sources, const ReferenceView& photo,
                         double scale, ReferenceView& out) {

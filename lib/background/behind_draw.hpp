@@ -7,9 +7,6 @@
 
 namespace stx::behind {
 
-/// Lets what is hidden go on by some pixels under what is before it, as it is where that begins.
-void growUnder(Layer& layer, Sources& sources);
-
 /// Draws what was invented in blocks into new images of `out`, whose camera has the size of the
 /// photograph with its border: smooth colours, and on them the fine detail of the photograph at
 /// `sources`. Gives the number of pixels inside of the photograph's frame. `scale`: parallax times

@@ -92,4 +92,14 @@ void inventDepth(Layer& layer);
 /// colour.
 void inventColour(Layer& layer);
 
+/// For each block where in the photograph what is like it is seen; -1: nowhere. Both count in
+/// blocks of the larger picture.
+using Sources = Image<glm::ivec2>;
+
+/// Lets what is hidden go on under what is before it, as it is where that begins: by some pixels
+/// everywhere, and as far as it is seen from the side (where what is seen first has a slope that
+/// hides what is behind it, that is farther than `hidden` blocks reach). `layer.parallax` has no
+/// steps.
+void growUnder(Layer& layer, Sources& sources);
+
 }  // namespace stx::behind

@@ -7,10 +7,6 @@
 
 namespace stx::behind {
 
-/// For each block where in the photograph what is like it is seen; -1: nowhere. Both count in
-/// blocks of the larger picture.
-using Sources = Image<glm::ivec2>;
-
 /// Finds for hidden and mixed blocks and those around the places of the photograph whose patches
 /// go on best what is beside them: at that depth or farther, without anything nearer in them
 /// (PatchMatch, Barnes et al. 2009, and votes from coarse to fine, Wexler et al. 2007; each round

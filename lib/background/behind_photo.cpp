@@ -42,15 +42,19 @@ double farthestFrom(double median, const Image<float>& depth, double scale, glm:
     return off[at];
 }
 
-/// Border that comes into the frame when the eye moves by the largest shift and looks at what is in
-/// the middle of the frame at the median distance: what parallax moves relatively to that, and what
-/// turning the camera adds towards the edges.
-glm::ivec2 borderOf(const ReferenceView& view, double scale, double median, int step) {
+/// Border that comes into the frame when the eye moves by the largest shift, a share of the median
+/// distance, and looks at what is in the middle of the frame at that distance: what parallax moves
+/// relatively to that, and what turning the camera adds towards the edges. With t the tangent from
+/// the axis to the edge, an edge that is turned away by the shift s has (t + s) / (1 - t s).
+glm::ivec2 borderOf(const ReferenceView& view, double scale, double median, double shift,
+                    int step) {
     const int w = view.depth.width(), h = view.depth.height();
     const Camera& camera = view.camera;
     const auto side = [&](double off, int size, double f) {
-        const double slope = 0.5 * size / f;
-        const double wanted = off + median * slope * slope + kBorderMargin;
+        const double t = 0.5 * size / f;
+        const double turned =
+            t * shift < 1 ? (1 + t * t) / (1 - t * shift) - 1 : kMostBorder * size;
+        const double wanted = off + median * turned + kBorderMargin;
         const double most = kMostBorder * size;
         return static_cast<int>(std::ceil(std::min(wanted, most) / step)) * step;
     };
@@ -111,7 +115,8 @@ Result<BehindPhoto> behindPhoto(const ReferenceView& view, const BehindSettings&
     const double scale = median * distance;
     const int step =
         (std::max(view.depth.width(), view.depth.height()) + kMostBlocks - 1) / kMostBlocks;
-    const Frame frame = frameOf(view, borderOf(view, scale, median, step), step);
+    const Frame frame =
+        frameOf(view, borderOf(view, scale, median, settings.shiftPercent / 100, step), step);
     const std::uint64_t larger =
         static_cast<std::uint64_t>(frame.size.x) * static_cast<std::uint64_t>(frame.size.y);
     const auto blocks = static_cast<std::uint64_t>(step) * static_cast<std::uint64_t>(step);

@@ -1,6 +1,9 @@
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <unordered_map>
+#include <vector>
 
 #include "lib/capture/rasterizer.hpp"
 #include "lib/model/strays.hpp"
@@ -57,6 +60,24 @@ class PointGrid {
     std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
 };
 
+/// Sampled points or triangles say enough of how dense all are.
+constexpr std::size_t kDensitySamples = 4096;
+
+/// The median of the triangles' shortest sides; infinite without triangles.
+double shortSide(const Mesh& mesh) {
+    std::vector<double> sides;
+    const std::size_t step = std::max<std::size_t>(1, mesh.triangles.size() / kDensitySamples);
+    for (std::size_t i = 0; i < mesh.triangles.size(); i += step) {
+        const glm::uvec3 t = mesh.triangles[i];
+        const glm::dvec3 a(mesh.positions[t.x]), b(mesh.positions[t.y]), c(mesh.positions[t.z]);
+        sides.push_back(std::min({glm::length(b - a), glm::length(c - b), glm::length(a - c)}));
+    }
+    if (sides.empty()) return std::numeric_limits<double>::infinity();
+    const auto middle = sides.begin() + static_cast<std::ptrdiff_t>(sides.size() / 2);
+    std::nth_element(sides.begin(), middle, sides.end());
+    return *middle;
+}
+
 }  // namespace
 
 float pointRadius(const Mesh& mesh) {
@@ -66,23 +87,26 @@ float pointRadius(const Mesh& mesh) {
                             const glm::dvec3 p(mesh.positions[mesh.points[i]]);
                             return Piece{p, p};
                         }).bounds;
+    // Few points beside many triangles, as of a scan whose thin parts are loose points: they are as
+    // dense as the triangles.
     const double size = bounds.radius() * 2.0;
+    const double most = std::min(size * 0.02, shortSide(mesh));
     if (!(size > 0)) return 0.01f;  // one point, or all in one place: any radius shows it
     // Points lie on surfaces: n of them on a size x size area are size / sqrt(n) apart.
     const double guess = size / std::sqrt(static_cast<double>(mesh.points.size()));
     const PointGrid grid(mesh, guess);
     std::vector<double> distances;
-    const std::size_t step = std::max<std::size_t>(1, mesh.points.size() / 4096);
+    const std::size_t step = std::max<std::size_t>(1, mesh.points.size() / kDensitySamples);
     for (std::size_t i = 0; i < mesh.points.size(); i += step) {
         const double d = grid.nearest(mesh.points[i]);
         if (std::isfinite(d)) distances.push_back(d);
     }
-    if (distances.empty()) return static_cast<float>(std::min(guess * 0.5, size * 0.02));
+    if (distances.empty()) return static_cast<float>(std::min(guess * 0.5, most));
     // Irregular scans: most gaps are closed by the distance that nine in ten points stay under.
     const auto at = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 9 / 10);
     std::nth_element(distances.begin(), at, distances.end());
     // A handful of points does not make a surface: they stay dots.
-    return static_cast<float>(std::min(*at * std::numbers::sqrt2 * 0.75, size * 0.02));
+    return static_cast<float>(std::min(*at * std::numbers::sqrt2 * 0.75, most));
 }
 
 Mesh pointsAsDiscs(const Mesh& mesh, const Camera& camera, float radius) {

@@ -19,12 +19,13 @@ void checkError(const Result<T>& result) {
     if (!result && result.error().message.empty()) std::abort();
 }
 
-/// What a set gives must be a sound camera; later code relies on it.
+/// What a set gives must be a sound camera; later code relies on it. One without a size gets the
+/// rest of its lens from its picture, later.
 void checkViews(const Result<std::vector<imagesets::SetView>>& views) {
     checkError(views);
     if (!views) return;
     for (const auto& view : *views) {
-        if (!view.panorama && !view.camera.check()) std::abort();
+        if (!view.panorama && view.camera.width > 0 && !view.camera.check()) std::abort();
     }
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <iterator>
+#include <limits>
 #include <memory>
 #include <span>
 
@@ -69,9 +71,47 @@ bool mayShow(const Camera& c, std::span<const glm::dvec3> corners) {
     return std::ranges::none_of(beyond, [](bool all) { return all; });
 }
 
+/// How far an eye goes to the side of a photograph, of the median distance: as behindPhoto() has it
+/// unless another distance is asked for.
+constexpr double kEyeAside = 0.08;
+/// What such an eye sees between two pixels beside each other, in pixels: a narrower gap is joined.
+constexpr double kNarrowGap = 1.5;
+
+/// One view and what is behind it: no third one shows anything where these two are open.
+struct OnePlace {
+    const Source* front = nullptr;
+    const Source* behind = nullptr;
+    glm::ivec2 border{0};  ///< of the view behind: its pixels at the left and above
+    /// How far points move in the picture when an eye goes to the side, in pixels times distance.
+    double parallax = 0;
+};
+
+/// Nothing, if a scene is anything else than two views from one place with one direction.
+OnePlace onePlaceOf(const SurfaceScene& scene) {
+    OnePlace place;
+    for (const Source& s : scene.sources) (s.view->background ? place.behind : place.front) = &s;
+    if (scene.sources.size() != 2 || !place.front || !place.behind) return {};
+    const Camera &a = place.front->view->camera, &b = place.behind->view->camera;
+    const glm::dvec2 border(b.cx - a.cx, b.cy - a.cy);
+    place.border = glm::ivec2(glm::round(border));
+    const bool same = a.position == b.position && a.orientation == b.orientation && a.fx == b.fx &&
+                      a.fy == b.fy && a.orthographic == b.orthographic &&
+                      glm::length(border - glm::dvec2(place.border)) < 1e-3;
+    if (!same) return {};
+    std::vector<float> q;
+    std::ranges::copy_if(place.front->whole->q.pixels(), std::back_inserter(q),
+                         [](float value) { return value > 0; });
+    if (q.empty()) return {};
+    const auto middle = q.begin() + static_cast<std::ptrdiff_t>(q.size() / 2);
+    std::ranges::nth_element(q, middle);
+    place.parallax = kEyeAside * place.front->space.axis.dist(*middle) * std::max(a.fx, a.fy);
+    return place;
+}
+
 class Maker {
   public:
-    explicit Maker(const SurfaceScene& scene) : scene_(scene), used_(scene.sources.size()) {}
+    explicit Maker(const SurfaceScene& scene)
+        : scene_(scene), used_(scene.sources.size()), onePlace_(onePlaceOf(scene)) {}
 
     /// Before surfaceOf() of any. Triangles are found again then: those of all views are many.
     void prepare(std::size_t number) {
@@ -84,7 +124,7 @@ class Maker {
     }
 
     /// All triangles of a block of a view, without a choice among views.
-    [[nodiscard]] static std::vector<Triangle> trianglesOf(const Source& s, int column, int row) {
+    [[nodiscard]] std::vector<Triangle> trianglesOf(const Source& s, int column, int row) const {
         std::vector<Triangle> out;
         const auto add = [&](int ax, int ay, int bx, int by, int cx, int cy) {
             const Triangle t{{index(s, ax, ay), index(s, bx, by), index(s, cx, cy)}};
@@ -95,6 +135,7 @@ class Maker {
         const SourceBlock& block = s.blocks[static_cast<std::size_t>(row) * s.blocksX + column];
         const int x0 = column * kBlock, y0 = row * kBlock;
         for (std::uint32_t l = block.leafBegin; l < block.leafEnd; ++l) addLeaf(s.leaves[l], add);
+        if (onePlace_.front) addWhereOpen(s, block, {x0, y0}, add);
         if (!block.anyCell) return out;
         BlockBuffer buffer;
         const BlockTexels texels = blockTexels(s, x0, y0, buffer);
@@ -102,6 +143,7 @@ class Maker {
             for (std::uint32_t left = block.cells[static_cast<std::size_t>(j)]; left;
                  left &= left - 1) {
                 const int i = std::countr_zero(left);
+                if (onePlace_.front && openAt(s, x0 + i, y0 + j)) continue;
                 addCell(cellShape(s, texels, i, j), x0 + i, y0 + j, add);
             }
         }
@@ -167,7 +209,7 @@ class Maker {
                 if (triangles.empty()) continue;
                 const auto others = othersAt(s, bx, by);
                 for (const Triangle& t : triangles)
-                    if (!shownBetter(s, t, others)) add(t);
+                    if (&s == onePlace_.behind || !shownBetter(s, t, others)) add(t);
             }
         }
         for (std::uint32_t pixel = 0; pixel < count; ++pixel) {
@@ -184,6 +226,58 @@ class Maker {
     }
 
   private:
+    /// Nothing is behind an edge in this cell, from wherever one looks: it is joined in spite of
+    /// it.
+    [[nodiscard]] bool openAt(const Source& s, int x, int y) const {
+        if (x + 1 >= s.width || y + 1 >= s.height || joined(s, x, y)) return false;
+        if (&s == onePlace_.behind) return true;
+        if (gapAt(s, x, y) < kNarrowGap) return true;
+        const Source& behind = *onePlace_.behind;
+        for (int k = 0; k < 4; ++k) {
+            const glm::ivec2 at = glm::ivec2(x + k % 2, y + k / 2) + onePlace_.border;
+            if (!(at.x >= 0 && at.y >= 0 && at.x < behind.width && at.y < behind.height &&
+                  shows(behind, index(behind, at.x, at.y))))
+                return true;
+        }
+        return false;
+    }
+
+    /// The widest gap that an eye at the side sees in a cell, pixels.
+    [[nodiscard]] double gapAt(const Source& s, int x, int y) const {
+        double nearest = 0, farthest = std::numeric_limits<double>::infinity();
+        for (int k = 0; k < 4; ++k) {
+            const double q = s.whole->q.data()[index(s, x + k % 2, y + k / 2)];
+            const double moved = onePlace_.parallax / s.space.axis.dist(q);
+            nearest = std::max(nearest, moved);
+            farthest = std::min(farthest, moved);
+        }
+        return nearest - farthest;
+    }
+
+    /// The cells of a block that have an edge in them and nothing behind it.
+    template <class Add>
+    void addWhereOpen(const Source& s, const SourceBlock& block, glm::ivec2 corner,
+                      const Add& add) const {
+        std::array<std::uint16_t, kBlock> inLeaf{};
+        for (std::uint32_t l = block.leafBegin; l < block.leafEnd; ++l) {
+            const Leaf& leaf = s.leaves[l];
+            for (int v = 0; v < leaf.size; ++v)
+                for (int u = 0; u < leaf.size; ++u)
+                    inLeaf[static_cast<std::size_t>(leaf.y + v - corner.y)] |=
+                        static_cast<std::uint16_t>(1u << (leaf.x + u - corner.x));
+        }
+        const float* q = s.whole->q.data();
+        for (int j = 0; j < kBlock; ++j) {
+            for (int i = 0; i < kBlock; ++i) {
+                const int x = corner.x + i, y = corner.y + j;
+                if ((inLeaf[static_cast<std::size_t>(j)] >> i & 1) || !openAt(s, x, y)) continue;
+                const bool falling = std::abs(q[index(s, x, y)] - q[index(s, x + 1, y + 1)]) <
+                                     std::abs(q[index(s, x + 1, y)] - q[index(s, x, y + 1)]);
+                addCell(falling ? kFallingSplit : kRisingSplit, x, y, add);
+            }
+        }
+    }
+
     /// The pixels within kReach of one that are joined to it there.
     class Joined {
       public:
@@ -414,6 +508,7 @@ class Maker {
 
     const SurfaceScene& scene_;
     std::vector<std::vector<bool>> used_;  ///< of each source: pixels that are corners
+    OnePlace onePlace_;
 };
 
 }  // namespace

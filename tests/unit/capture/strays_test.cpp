@@ -26,6 +26,28 @@ void addPoint(Mesh& mesh, glm::vec3 at) {
     mesh.positions.push_back(at);
 }
 
+// What is one pixel thin in a captured view is loose points beside its triangles.
+TEST(Points, FewBesideFineTrianglesAreAsSmallAsThese) {
+    Mesh mesh;
+    constexpr std::uint32_t kSide = 101;
+    constexpr float kStep = 0.01f;
+    for (std::uint32_t y = 0; y < kSide; ++y)
+        for (std::uint32_t x = 0; x < kSide; ++x)
+            mesh.positions.emplace_back(static_cast<float>(x) * kStep,
+                                        static_cast<float>(y) * kStep, 0);
+    for (std::uint32_t y = 0; y + 1 < kSide; ++y) {
+        for (std::uint32_t x = 0; x + 1 < kSide; ++x) {
+            const std::uint32_t a = y * kSide + x, c = a + kSide;
+            mesh.triangles.emplace_back(a, a + 1, c);
+            mesh.triangles.emplace_back(a + 1, c + 1, c);
+        }
+    }
+    for (const float x : {0.1f, 0.5f, 0.9f}) addPoint(mesh, {x, x, 0.2f});
+    EXPECT_NEAR(pointRadius(mesh), kStep, 1e-4);
+    mesh.triangles.clear();
+    EXPECT_GT(pointRadius(mesh), 1.2f * kStep) << "alone they are larger";
+}
+
 TEST(Strays, OnePointFarOffHidesNothing) {
     const Mesh clean = sphereCloud(20000);
     Mesh mesh = clean;
