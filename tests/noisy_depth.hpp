@@ -79,6 +79,32 @@ inline void displaceEdges(stx::Bundle& bundle, int pixels) {
     }
 }
 
+/// This share of the pixels beside a step of depth of 5 % and more lie anywhere between both
+/// surfaces, as depth cameras have them where one pixel sees both ("flying pixels").
+inline void mixEdges(stx::Bundle& bundle, double share) {
+    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+        auto& view = bundle.views[i];
+        const stx::Image<float> exact = view.depth;
+        for (int y = 1; y + 1 < exact.height(); ++y) {
+            for (int x = 1; x + 1 < exact.width(); ++x) {
+                const auto pixel = static_cast<std::uint64_t>(y * exact.width() + x);
+                if (!stx::hasPoint(exact.at(x, y)) || uniform(i, pixel, 9) > share) continue;
+                float low = exact.at(x, y), high = low;
+                for (int v = y - 1; v <= y + 1; ++v) {
+                    for (int u = x - 1; u <= x + 1; ++u) {
+                        const float dist = exact.at(u, v);
+                        low = stx::hasPoint(dist) ? std::min(low, dist) : low;
+                        high = stx::hasPoint(dist) ? std::max(high, dist) : high;
+                    }
+                }
+                if (high > 1.05f * low)
+                    view.depth.at(x, y) =
+                        low + (high - low) * static_cast<float>(uniform(i, pixel, 10));
+            }
+        }
+    }
+}
+
 /// Pictures of cameras that expose for themselves: a gain of each view (up to 12 %) and channel (up
 /// to 3 %) and a black of its own (up to 4 of 255). The colours of a third of the views stay.
 inline void changeLight(stx::Bundle& bundle) {
@@ -104,7 +130,8 @@ inline void changeLight(stx::Bundle& bundle) {
     }
 }
 
-/// By name: noiseN (percent of the distance), codes8, missing3, edges1, light.
+/// By name: noiseN (percent of the distance), codes8, missing3, edges1, mixedN (percent of the
+/// pixels beside edges), light.
 inline bool damage(stx::Bundle& bundle, const std::string& kind) {
     if (kind.starts_with("noise") && std::atof(kind.c_str() + 5) > 0)
         addNoise(bundle, 0.01 * std::atof(kind.c_str() + 5));
@@ -114,6 +141,8 @@ inline bool damage(stx::Bundle& bundle, const std::string& kind) {
         loseDepth(bundle, 0.03);
     else if (kind == "edges1")
         displaceEdges(bundle, 1);
+    else if (kind.starts_with("mixed") && std::atof(kind.c_str() + 5) > 0)
+        mixEdges(bundle, 0.01 * std::atof(kind.c_str() + 5));
     else if (kind == "light")
         changeLight(bundle);
     else

@@ -38,7 +38,7 @@ double secondsSince(Clock::time_point start) {
 std::string outputOf(const std::string& pattern, const std::string& input) {
     fs::path path(input);
     if (!path.has_filename()) path = path.parent_path();
-    const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+    const fs::path folder = folderOf(path);
     std::error_code ec;
     fs::path whole = fs::absolute(folder, ec).lexically_normal();
     if (!whole.has_filename()) whole = whole.parent_path();

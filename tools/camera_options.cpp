@@ -170,22 +170,22 @@ Result<std::size_t> namedView(int view, const std::vector<ReferenceView>& views)
     return first == views.end() ? 0 : static_cast<std::size_t>(first - views.begin());
 }
 
-Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const CameraContext& context,
-                                             Program& program) {
-    // An orbit may have a target and an axis.
-    const bool pose = !o.eye.empty() || (o.orbit == 0 && (!o.target.empty() || !o.up.empty()));
-    const bool sways = o.swayPercent > 0;
-    const int ways = (pose ? 1 : 0) + (sways || o.view >= 0 ? 1 : 0) + (o.orbit > 0 ? 1 : 0) +
-                     (o.cameraFile.empty() ? 0 : 1);
+namespace {
+
+/// A single picture from somewhere; an orbit may have a target and an axis.
+bool isPose(const CameraOptions& o) {
+    return !o.eye.empty() || (o.orbit == 0 && (!o.target.empty() || !o.up.empty()));
+}
+
+/// Options that exclude each other, and the ranges of lenses.
+Result<void> checkWays(const CameraOptions& o) {
+    const int ways = (isPose(o) ? 1 : 0) + (o.swayPercent > 0 || o.view >= 0 ? 1 : 0) +
+                     (o.orbit > 0 ? 1 : 0) + (o.cameraFile.empty() ? 0 : 1);
     if (ways > 1)
         return fail(
             ErrorCode::usage,
             "--eye/--target/--up, --view, --sway, --orbit and --cameras exclude each other; give "
             "one (an orbit may have --target and --up, and --sway a --view)");
-    std::optional<glm::ivec2> size;
-    if (!o.size.empty()) {
-        STX_TRY(size, parseSize(o.size, program.job.limits));
-    }
     if (o.fovDeg && !(*o.fovDeg > 0.0 && *o.fovDeg < 180.0))
         return fail(ErrorCode::usage, "--fov is {:g}; it must be above 0 and below 180 degrees",
                     *o.fovDeg);
@@ -194,7 +194,48 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
                     *o.orthoHeight);
     if (o.fovDeg && o.orthoHeight)
         return fail(ErrorCode::usage, "--fov and --ortho exclude each other; give one");
+    return {};
+}
 
+/// The lens of cameras of a pose or an orbit, and what is up in their pictures.
+Result<CameraSettings> lensOf(const CameraOptions& o, const CameraContext& context,
+                              std::optional<glm::ivec2> size, Program& program) {
+    CameraSettings lens;
+    if (size) {
+        lens.width = size->x;
+        lens.height = size->y;
+    }
+    if (o.fovDeg) lens.fovRad = *o.fovDeg * kDegree;
+    lens.orthoHeight = o.orthoHeight.value_or(0);
+    if (!o.up.empty()) {
+        STX_TRY(lens.up, parseDirection(o.up, "--up"));
+    } else if (context.up) {
+        lens.up = *context.up;
+        noteSplatsUp(lens.up, program.job);
+    } else {
+        lens.up = upOfCameras(context.views);
+        if (lens.up != glm::dvec3(0, 1, 0))
+            program.job.note(fmt::format(
+                "the reference views stand upright along {}{}, and so does the {}; --up changes "
+                "that",
+                lens.up.x + lens.up.y + lens.up.z < 0 ? "-" : "+",
+                lens.up.x != 0   ? "X"
+                : lens.up.y != 0 ? "Y"
+                                 : "Z",
+                isPose(o) ? "picture" : "orbit"));
+    }
+    return lens;
+}
+
+}  // namespace
+
+Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const CameraContext& context,
+                                             Program& program) {
+    STX_CHECK(checkWays(o));
+    std::optional<glm::ivec2> size;
+    if (!o.size.empty()) {
+        STX_TRY(size, parseSize(o.size, program.job.limits));
+    }
     if (context.sway) {
         STX_TRY(const auto swaying, swayCameras(context.sway->camera, context.sway->distance,
                                                 o.swayPercent / 100, swayCount(o)));
@@ -216,37 +257,14 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
         return out;
     }
 
-    CameraSettings lens;
-    if (size) {
-        lens.width = size->x;
-        lens.height = size->y;
-    }
-    if (o.fovDeg) lens.fovRad = *o.fovDeg * kDegree;
-    lens.orthoHeight = o.orthoHeight.value_or(0);
+    STX_TRY(const CameraSettings lens, lensOf(o, context, size, program));
     glm::dvec3 target = context.bounds.empty() ? glm::dvec3(0) : context.bounds.centre();
-    if (!o.up.empty()) {
-        STX_TRY(lens.up, parseDirection(o.up, "--up"));
-    } else if (context.up) {
-        lens.up = *context.up;
-        noteSplatsUp(lens.up, program.job);
-    } else {
-        lens.up = upOfCameras(context.views);
-        if (lens.up != glm::dvec3(0, 1, 0))
-            program.job.note(fmt::format(
-                "the reference views stand upright along {}{}, and so does the {}; --up changes "
-                "that",
-                lens.up.x + lens.up.y + lens.up.z < 0 ? "-" : "+",
-                lens.up.x != 0   ? "X"
-                : lens.up.y != 0 ? "Y"
-                                 : "Z",
-                pose ? "picture" : "orbit"));
-    }
     if (!o.target.empty()) {
         STX_TRY(target, parseVec3(o.target, "--target"));
         target -= context.origin;
     }
     const double radius = context.bounds.radius();
-    if (!pose) {
+    if (!isPose(o)) {
         STX_TRY(const auto circle,
                 orbitCameras(target, radius,
                              {std::max(o.orbit, 1), o.elevationDeg * kDegree, o.startDeg * kDegree,
@@ -279,8 +297,7 @@ Result<int> checkCameraOptions(const CameraOptions& options, const Command& comm
                                              sways         ? "--sway"
                                              : o.view >= 0 ? "--view"
                                                            : "--cameras")));
-    if (own || !o.eye.empty() || (o.orbit == 0 && (!o.target.empty() || !o.up.empty())))
-        STX_CHECK(command.refuse({"--elevation"}, "is of --orbit"));
+    if (own || isPose(o)) STX_CHECK(command.refuse({"--elevation"}, "is of --orbit"));
     if (o.orbit == 0) STX_CHECK(command.refuse({"--radius", "--start", "--arc"}, "is of --orbit"));
     if (o.cameraFile.empty())
         STX_CHECK(command.refuse({"--dataparser"}, "is of --cameras camera_path.json"));

@@ -14,7 +14,6 @@ namespace {
 struct BenchCommandOptions {
     BenchSettings settings;
     int table = 0;
-    std::string plot;
     std::vector<std::string> ablate;
     RenderSettings drawing;
 };
@@ -113,7 +112,7 @@ Result<int> benchStages(const BenchCommandOptions& o, Program& program) {
 
 Result<int> bench(const BenchCommandOptions& o, const Command& command, Program& program) {
     if (!o.ablate.empty()) {
-        STX_CHECK(command.refuse({"--table", "--paths", "--splat", "--device", "--plot"},
+        STX_CHECK(command.refuse({"--table", "--paths", "--splat", "--device"},
                                  "does not go with --ablate"));
         return benchStages(o, program);
     }
@@ -127,10 +126,6 @@ Result<int> bench(const BenchCommandOptions& o, const Command& command, Program&
     } else {
         program.print(benchText(report));
     }
-    if (!o.plot.empty()) {
-        const std::string svg = benchSvg(report);
-        STX_CHECK(writeFile(o.plot, std::as_bytes(std::span(svg)), program.outputOptions()));
-    }
     return 0;
 }
 
@@ -143,7 +138,7 @@ void addBench(CommandLine& line, Program& program) {
                  "OpenGL, software, and ours\n\n"
                  "  stx bench\n"
                  "  stx bench --ablate spot.obj capture.exr       what each stage is worth\n"
-                 "  stx bench --table 1 --format json --plot speed.svg");
+                 "  stx bench --table 1 --format json");
     auto o = std::make_shared<BenchCommandOptions>();
     c.option("--table", o->table, "Only table 1 (synthetic views) or 2 (full frames)")
         .oneOf({1, 2});
@@ -169,7 +164,6 @@ void addBench(CommandLine& line, Program& program) {
     c.choice<Quality>("--quality", o->drawing.quality,
                       {{"normal", Quality::normal}, {"best", Quality::best}},
                       "Of --ablate (default normal)");
-    c.option("--plot", o->plot, "Draw the figures").takes("FILE.svg");
     c.sharedOptions(program.common, kFormat | kOutput);
     c.runs([o, c](Program& p) { return bench(*o, c, p); });
 }

@@ -39,7 +39,7 @@ std::string stageNames() {
 std::string explained(const StageLog& log, std::size_t frames) {
     const auto entries = log.entries();
     double once = 0, each = 0;
-    // Parts of "prepare" are told by themselves, too.
+    // Parts of "prepare" that have rows of their own.
     const auto isPart = [](const StageLog::Entry& e) {
         return e.name == "creases" || e.name == "levels";
     };

@@ -56,8 +56,8 @@ bool watchStopSignals(std::atomic<bool>& cancelled, int patienceMs) {
     watching = false;
     try {
         std::thread(watch, signals, std::ref(cancelled), patienceMs).detach();
-        // A thread that is still being made holds locks of the C library or of a sanitizer. A fork()
-        // at that moment would leave them locked in the copy for good.
+        // A thread that is still being made holds locks of the C library or of a sanitizer. A
+        // fork() at that moment would leave them locked in the copy for good.
         watching.wait(false);
         return true;
     } catch (const std::system_error&) {

@@ -1,9 +1,7 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 #include <variant>
-#include <vector>
 
 #include "formats/any/options.hpp"
 #include "lib/base/job.hpp"

@@ -2,8 +2,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "formats/exr/exr_file.hpp"
@@ -62,9 +60,9 @@ struct ExrEnvironmentPart {
     Environment environment;  ///< as it is written
 };
 [[nodiscard]] Result<ExrEnvironmentPart> environmentPart(const Environment& environment, Job& job);
-/// Makes the part fit to be in one file with others: it takes over what all parts of a file must
-/// share (the size of the display window, the shape of pixels), and gets a name that none of them
-/// has.
+/// Changes a part so that it can be in one file with others: it gets the display window and the
+/// pixel aspect ratio of the others, which all parts of a file must share, and a name that none of
+/// them has.
 void joinParts(ExrPart& part, const std::vector<ExrPart>& others);
 [[nodiscard]] Result<void> writeEnvironmentPart(ExrWriter& writer, int index,
                                                 const ExrEnvironmentPart& part);

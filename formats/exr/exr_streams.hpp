@@ -3,7 +3,6 @@
 #include <OpenEXR/ImfIO.h>
 
 #include <cstring>
-#include <string>
 #include <vector>
 
 #include "formats/files/files.hpp"

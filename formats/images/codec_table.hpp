@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 
 /// How this process writes pictures with the module `stx_codecs`, in which OpenImageIO lives: plain

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string_view>
-
 #include "formats/images/images.hpp"
 
 namespace stx {

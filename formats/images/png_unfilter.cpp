@@ -8,9 +8,10 @@
 namespace stx {
 namespace {
 
-// A byte depends on the one before it, so a row is one long chain. Rows that follow each other are
-// done at once, each a pixel behind the one above it: what a row finds above is what that one had a
-// moment ago. GCC and clang make vector instructions of these types on every processor.
+// A filtered byte depends on the byte before it, so that a row can only be undone from left to
+// right. But several rows are undone at once, each a pixel behind the row above it: the pixel above
+// has then just been computed. GCC and clang make vector instructions of these types on every
+// processor.
 
 constexpr std::size_t kBytes = 16;
 using Lanes = std::uint8_t __attribute__((vector_size(kBytes)));

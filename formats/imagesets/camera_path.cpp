@@ -93,13 +93,8 @@ Result<std::vector<SetView>> cameraPathViews(const Json& file, Job& job) {
         c.cx = c.width * 0.5;
         c.cy = c.height * 0.5;
         STX_TRY(const auto m, needNumbers(entry, "camera_to_world", 16, where));
-        glm::dmat3 rotation;
-        for (int row = 0; row < 3; ++row) {
-            for (int column = 0; column < 3; ++column)
-                rotation[column][row] = m[static_cast<std::size_t>(4 * row + column)];
-            c.position[row] = m[static_cast<std::size_t>(4 * row + 3)];
-        }
-        STX_TRY(rotation, repairRotation(rotation, c.fy, where, job));
+        c.position = {m[3], m[7], m[11]};
+        STX_TRY(const auto rotation, repairRotation(rotationOfRows(m), c.fy, where, job));
         c.orientation = glm::normalize(glm::quat_cast(rotation));
         if (auto ok = c.check(); !ok) return tl::unexpected(ok.error().at(where));
         views.push_back(std::move(view));

@@ -149,7 +149,7 @@ Result<std::vector<SetView>> camerasJsonViews(const Json& file, Job& job) {
 Result<SetDescription> describeCamerasJson(const path& given, const ImageSetOptions&, Job& job) {
     std::error_code ec;
     const path file = std::filesystem::is_directory(given, ec) ? given / "cameras.json" : given;
-    const path folder = file.has_parent_path() ? file.parent_path() : path(".");
+    const path folder = folderOf(file);
     const std::string where = inQuotes(file.string());
     STX_TRY(const Json json, readJson(file, job.limits));
     if (jsonKindOf(json) != JsonKind::cameras)

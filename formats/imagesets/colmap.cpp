@@ -256,8 +256,7 @@ Result<Model3d> readModel(const path& given, const Limits& limits) {
     m.base = given;
     std::error_code ec;
     // One of its files is given in place of the folder.
-    if (std::filesystem::is_regular_file(given, ec))
-        m.base = given.has_parent_path() ? given.parent_path() : path(".");
+    if (std::filesystem::is_regular_file(given, ec)) m.base = folderOf(given);
     const path folder = m.base;
     const auto hasModel = [&](const path& in) {
         for (const bool b : {true, false}) {

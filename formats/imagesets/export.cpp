@@ -14,15 +14,7 @@
 namespace stx {
 namespace {
 
-using imagesets::addOwnKeys;
-using imagesets::colourEnding;
-using imagesets::fileNames;
-using imagesets::kEnvironmentFile;
-using imagesets::OutputJson;
-using imagesets::transformsFrame;
-using imagesets::writeColour;
-using imagesets::writeFloatDepth;
-using imagesets::writeIntegerDepth;
+using namespace imagesets;
 
 using std::filesystem::path;
 
@@ -103,6 +95,55 @@ Result<OutputJson> mivCamera(const ReferenceView& view, const std::string& name,
     return camera;
 }
 
+/// The file that names the cameras, and the unit of integer depth (scene units).
+struct Head {
+    OutputJson json;
+    double unit = 0.001;
+};
+
+Result<Head> headOf(const ViewTable& table, const std::vector<std::string>& names,
+                    const ExportOptions& options, Job& job) {
+    const Bundle& bundle = table.about();
+    const bool miv = options.kind == ExportOptions::Kind::miv;
+    const bool floats = options.depth != ExportOptions::Depth::png;
+    Head head;
+    if (miv) {
+        head.json["Version"] = "2.0";
+        head.json["Content_name"] = bundle.title;
+        head.json["Fps"] = 30;
+        head.json["Frames_number"] = 1;
+        for (const std::string& name : names) head.json["sourceCameraNames"].push_back(name);
+    } else {
+        head.json["stx:title"] = bundle.title;
+        if (!floats) {
+            // Millimetres where they reach, else the finest unit that does.
+            for (const ReferenceView& view : bundle.views)
+                head.unit = std::max(head.unit, view.farPlane / 65535);
+            head.json["integer_depth_scale"] = head.unit;
+            job.note(fmt::format("depth is rounded to steps of {:.3g} scene units", head.unit));
+        }
+    }
+    const glm::dvec3& o = bundle.origin;
+    if (o != glm::dvec3(0.0)) head.json["stx:origin"] = {o.x, o.y, o.z};
+    if (bundle.environment) head.json["stx:environment"] = kEnvironmentFile;
+    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+        const ReferenceView& view = bundle.views[i];
+        if (!miv) {
+            head.json["frames"].push_back(
+                transformsFrame(view, table.kindsOf(i).linear, names[i], options, bundle.origin));
+            continue;
+        }
+        STX_TRY(auto camera, mivCamera(view, names[i], bundle.origin));
+        head.json["cameras"].push_back(std::move(camera));
+        if (!floats) {
+            STX_TRY(const MivRange range, mivRange(view));
+            job.note(fmt::format("view '{}': depth is rounded by up to {:.2g} scene units",
+                                 view.name, range.errorAt(view.farPlane)));
+        }
+    }
+    return head;
+}
+
 }  // namespace
 
 Result<void> exportImages(const Bundle& bundle, const path& folder, const ExportOptions& options,
@@ -119,8 +160,6 @@ Result<void> exportViews(const ViewTable& table, const path& folder, const Expor
         return exportViews(*viewsOf(whole), folder, options, job);
     }
     const Bundle& bundle = table.about();
-    const bool miv = options.kind == ExportOptions::Kind::miv;
-    const bool floats = options.depth != ExportOptions::Depth::png;
     if (options.depth == ExportOptions::Depth::npy &&
         options.kind != ExportOptions::Kind::transforms)
         return fail(ErrorCode::usage, "depth as .npy is of transforms.json; take exr or png");
@@ -133,53 +172,13 @@ Result<void> exportViews(const ViewTable& table, const path& folder, const Expor
     if (options.kind == ExportOptions::Kind::colmap && bundle.environment)
         job.note("COLMAP's workspace has no place for the environment: it is left out");
     if (options.kind == ExportOptions::Kind::colmap)
-        return imagesets::exportColmap(table, folder, names, options, job);
+        return exportColmap(table, folder, names, options, job);
 
-    OutputJson json;
-    double unit = 0.001;
-    double farthest = 0;
-    for (const ReferenceView& view : bundle.views) farthest = std::max(farthest, view.farPlane);
-    if (miv) {
-        json["Version"] = "2.0";
-        json["Content_name"] = bundle.title;
-        json["Fps"] = 30;
-        json["Frames_number"] = 1;
-        for (const std::string& name : names) json["sourceCameraNames"].push_back(name);
-    } else {
-        json["stx:title"] = bundle.title;
-        if (!floats) {
-            // Millimetres where they reach, else the finest unit that does.
-            if (farthest > unit * 65535) unit = farthest / 65535;
-            json["integer_depth_scale"] = unit;
-            job.note(fmt::format("depth is rounded to steps of {:.3g} scene units", unit));
-        }
-    }
-    const glm::dvec3& o = bundle.origin;
-    if (o != glm::dvec3(0.0)) json["stx:origin"] = {o.x, o.y, o.z};
-    if (bundle.environment) json["stx:environment"] = kEnvironmentFile;
-    const char* depthEnding = imagesets::endingOf(options.depth);
-    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
-        const ReferenceView& view = bundle.views[i];
-        if (!miv) {
-            json["frames"].push_back(
-                transformsFrame(view, table.kindsOf(i).linear, names[i], options, bundle.origin));
-            continue;
-        }
-        STX_TRY(auto camera, mivCamera(view, names[i], bundle.origin));
-        json["cameras"].push_back(std::move(camera));
-        if (!floats) {
-            STX_TRY(const MivRange range, mivRange(view));
-            job.note(fmt::format("view '{}': depth is rounded by up to {:.2g} scene units",
-                                 view.name, range.errorAt(view.farPlane)));
-        }
-    }
-    std::string text;
-    try {
-        text = json.dump(1) + "\n";
-    } catch (const std::exception&) {
-        return fail(ErrorCode::invalidInput, "the title or a view's name is not valid UTF-8");
-    }
-
+    STX_TRY(const auto head, headOf(table, names, options, job));
+    STX_TRY(const std::string text, setText(head.json));
+    const bool miv = options.kind == ExportOptions::Kind::miv;
+    const bool floats = options.depth != ExportOptions::Depth::png;
+    const char* depthEnding = endingOf(options.depth);
     std::vector<std::string> own;
     for (std::size_t i = 0; i < names.size(); ++i) {
         const char* colourEnd = colourEnding(table.kindsOf(i).linear, options);
@@ -195,16 +194,8 @@ Result<void> exportViews(const ViewTable& table, const path& folder, const Expor
     own.emplace_back(miv ? "cameras.json" : "transforms.json");
     STX_TRY(auto output, OutputFolder::create(folder, {options.noClobber}, own));
     const path& root = output.temporaryPath();
-    std::error_code ec;
-    if (!miv) {
-        for (const char* sub : {"images", "depth"}) {
-            std::filesystem::create_directory(root / sub, ec);
-            if (ec)
-                return failAt(inQuotes(folder.string()), ErrorCode::io, "cannot be written: {}",
-                              ec.message());
-        }
-    }
-    imagesets::ColourLoss loss;
+    if (!miv) STX_CHECK(makeImageFolders(root, folder));
+    ColourLoss loss;
     const auto write = [&](std::size_t i,
                            const std::shared_ptr<const ReferenceView>& read) -> Result<void> {
         const ReferenceView& view = *read;
@@ -216,7 +207,7 @@ Result<void> exportViews(const ViewTable& table, const path& folder, const Expor
                 view, root / (miv ? names[i] + "_depth.exr" : "depth/" + names[i] + depthEnding));
         if (!miv)
             return writeIntegerDepth(view, root / ("depth/" + names[i] + ".png"),
-                                     [&](double d) { return d / unit; });
+                                     [&](double d) { return d / head.unit; });
         STX_TRY(const MivRange range, mivRange(view));
         return writeIntegerDepth(view, root / (names[i] + "_depth16.png"),
                                  [&](double d) { return range.code(d); });

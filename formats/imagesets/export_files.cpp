@@ -1,4 +1,5 @@
 #include "formats/imagesets/export_files.hpp"
+#include "formats/files/messages.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,6 +7,7 @@
 
 #include "formats/exr/exr_file.hpp"
 #include "formats/files/files.hpp"
+#include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
 #include "formats/images/npy.hpp"
 
@@ -144,6 +146,26 @@ Result<void> writeIntegerDepth(const ReferenceView& view, const path& file,
     STX_TRY(const auto png,
             encodePng(view.depth.width(), view.depth.height(), 1, 16, codes.data(), false));
     return writeFile(file, png);
+}
+
+Result<void> makeImageFolders(const std::filesystem::path& in,
+                              const std::filesystem::path& folder) {
+    std::error_code ec;
+    for (const char* sub : {"images", "depth"}) {
+        std::filesystem::create_directory(in / sub, ec);
+        if (ec)
+            return failAt(inQuotes(folder.string()), ErrorCode::io, "cannot be written: {}",
+                          ec.message());
+    }
+    return {};
+}
+
+Result<std::string> setText(const OutputJson& json) {
+    try {
+        return json.dump(1) + "\n";
+    } catch (const std::exception&) {
+        return fail(ErrorCode::invalidInput, "the title or a view's name is not valid UTF-8");
+    }
 }
 
 void addOwnKeys(OutputJson& json, const ViewHeader& view, glm::dvec3 origin) {

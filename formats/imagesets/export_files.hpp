@@ -51,6 +51,12 @@ class ColourLoss {
                                              const std::filesystem::path& file,
                                              const std::function<double(double)>& code);
 
+/// Folders images/ and depth/ in a new one. `folder` is what errors name.
+[[nodiscard]] Result<void> makeImageFolders(const std::filesystem::path& in,
+                                            const std::filesystem::path& folder);
+/// The text of a set's file. Errors: names that are not UTF-8.
+[[nodiscard]] Result<std::string> setText(const OutputJson& json);
+
 /// What brings a view back to the bit; other programs do not look at it.
 void addOwnKeys(OutputJson& json, const ViewHeader& view, glm::dvec3 origin);
 /// A view in the frames of transforms.json, with images/NAME and depth/NAME.

@@ -11,14 +11,7 @@
 namespace stx {
 namespace {
 
-using imagesets::endingOf;
-using imagesets::fileNames;
-using imagesets::kEnvironmentFile;
-using imagesets::OutputJson;
-using imagesets::transformsFrame;
-using imagesets::writeColour;
-using imagesets::writeFloatDepth;
-using imagesets::writeIntegerDepth;
+using namespace imagesets;
 
 namespace fs = std::filesystem;
 
@@ -34,13 +27,7 @@ class FrameExporter {
         STX_TRY(auto output, OutputFolder::create(folder, {options_.noClobber},
                                                   {"transforms.json", kEnvironmentFile}));
         root_ = output.temporaryPath();
-        std::error_code ec;
-        for (const char* sub : {"images", "depth"}) {
-            fs::create_directory(root_ / sub, ec);
-            if (ec)
-                return failAt(inQuotes(folder.string()), ErrorCode::io, "cannot be written: {}",
-                              ec.message());
-        }
+        STX_CHECK(makeImageFolders(root_, folder));
         json_["stx:end"] = frames_.timeline().end;
         for (std::size_t i = 0; i < count; ++i) {
             job_.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(count),
@@ -50,12 +37,7 @@ class FrameExporter {
                 return tl::unexpected(done.error().at(
                     fmt::format("frame {} ({:g} s)", i, frames_.timeline().times[i])));
         }
-        std::string text;
-        try {
-            text = json_.dump(1) + "\n";
-        } catch (const std::exception&) {
-            return fail(ErrorCode::invalidInput, "the title or a view's name is not valid UTF-8");
-        }
+        STX_TRY(const std::string text, setText(json_));
         STX_CHECK(writeFile(root_ / "transforms.json",
                             std::as_bytes(std::span(text.data(), text.size()))));
         loss_.note(job_);
@@ -150,7 +132,7 @@ class FrameExporter {
     Sequence& frames_;
     const ExportOptions& options_;
     Job& job_;
-    imagesets::ColourLoss loss_;
+    ColourLoss loss_;
     fs::path root_;
     OutputJson json_;
     Bundle first_;  ///< names and cameras

@@ -169,9 +169,7 @@ Result<SetDescription> describeExr(const path& given, const ImageSetOptions&, Jo
     } else {
         files.push_back(given);
     }
-    const path folder = isFolder                  ? given
-                        : given.has_parent_path() ? given.parent_path()
-                                                  : path(".");
+    const path folder = isFolder ? given : folderOf(given);
     const std::string where = inQuotes(given.string());
     if (files.empty())
         return failAt(

@@ -1,6 +1,5 @@
 #include "formats/imagesets/json_values.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace stx::imagesets {

@@ -41,7 +41,7 @@ Camera cameraAt(double x, double f, double cx, double cy, int width, int height)
 }
 
 Result<SetDescription> describeCalibrated(const path& file, Job& job) {
-    const path folder = file.has_parent_path() ? file.parent_path() : path(".");
+    const path folder = folderOf(file);
     const std::string where = inQuotes(file.string());
     STX_TRY(const auto bytes, readFile(file, job.limits));
     STX_TRY(const auto calibration, within(where, parseMiddlebury(textOf(bytes), job.limits)));

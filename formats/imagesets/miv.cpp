@@ -319,7 +319,7 @@ void noteMissing(SetView& view, int frame, const std::vector<std::string>& textu
 
 Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& options, Job& job) {
     STX_TRY(const path file, cameraListIn(given, job));
-    const path folder = file.has_parent_path() ? file.parent_path() : path(".");
+    const path folder = folderOf(file);
     const std::string where = inQuotes(file.string());
     STX_TRY(const Json json, readJson(file, job.limits));
     if (jsonKindOf(json) != JsonKind::miv)

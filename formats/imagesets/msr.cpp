@@ -157,7 +157,7 @@ Result<SetDescription> describeMsr(const path& given, const ImageSetOptions& opt
                           "no calibParams-*.txt was found in it; give the folder of Breakdancers "
                           "or Ballet, or the file");
     }
-    const path folder = file.has_parent_path() ? file.parent_path() : path(".");
+    const path folder = folderOf(file);
     const std::string where = inQuotes(file.string());
     if (!(options.depthMin > 0 && options.depthMin < options.depthMax))
         return failAt(where, ErrorCode::usage,

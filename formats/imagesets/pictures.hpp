@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdint>
-
 #include "formats/files/files.hpp"
 #include "formats/imagesets/set_view.hpp"
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 
 #include <glm/glm.hpp>
@@ -8,6 +9,12 @@
 #include "lib/geometry/camera.hpp"
 
 namespace stx::imagesets {
+
+/// The 3x3 matrix of three rows of four numbers (R | t), one after the other.
+[[nodiscard]] inline glm::dmat3 rotationOfRows(std::span<const double> rows) {
+    return glm::transpose(glm::dmat3(rows[0], rows[1], rows[2], rows[4], rows[5], rows[6], rows[8],
+                                     rows[9], rows[10]));
+}
 
 /// The nearest rotation to a matrix that should be one (its polar factor). Corrections that move a
 /// pixel by more than 0.01 (for a focal length of `focalPixels`) are noted with their size. Errors:

@@ -39,18 +39,10 @@ Result<Intrinsics> findIntrinsics(const path& folder, bool icl, const ImageSetOp
     const std::string file = firstThere(folder, {"intrinsics.txt", "calibration.txt", "camera.txt",
                                                  "camera_intrinsics.txt", "camera-intrinsics.txt"});
     if (!file.empty()) {
-        const std::string where = inQuotes((folder / file).string());
-        STX_TRY(const auto bytes, readFile(folder / file, job.limits));
-        std::vector<double> n;
-        for (const TextLine& line : linesOf(textOf(bytes))) {
-            for (const auto word : line.words()) {
-                STX_TRY(const double value, within(where, numberOf(word, line.where())));
-                n.push_back(value);
-            }
-        }
+        STX_TRY(const auto n, numbersIn(folder / file, job.limits));
         if (n.size() == 9) return intrinsicsOf(n[0], n[4], n[2], n[5]);
         if (n.size() == 4) return intrinsicsOf(n[0], n[1], n[2], n[3]);
-        return failAt(where, ErrorCode::invalidInput,
+        return failAt(inQuotes((folder / file).string()), ErrorCode::invalidInput,
                       "{} numbers; 'fx fy cx cy' or a 3x3 matrix is expected", n.size());
     }
     const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
@@ -257,9 +249,7 @@ std::optional<TimedPose> poseAt(const std::vector<TimedPose>& poses, double time
 Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& options, Job& job) {
     std::error_code ec;
     const bool isFolder = std::filesystem::is_directory(given, ec);
-    const path folder = isFolder                  ? given
-                        : given.has_parent_path() ? given.parent_path()
-                                                  : path(".");
+    const path folder = isFolder ? given : folderOf(given);
     const std::string where = inQuotes(given.string());
     std::string trajectory = isFolder ? "" : given.filename().string();
     if (trajectory.empty())

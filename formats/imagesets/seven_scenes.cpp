@@ -60,15 +60,7 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
     for (const std::string& stem : stems) {
         const std::string poseName = stem + ".pose.txt";
         const std::string place = inQuotes((given / poseName).string());
-        STX_TRY(const auto bytes, readFile(given / poseName, job.limits));
-        std::vector<double> n;
-        for (const TextLine& line : linesOf(textOf(bytes))) {
-            for (const auto word : line.words()) {
-                STX_TRY(const double value, within(place, numberOf(word, line.where())));
-                n.push_back(value);
-            }
-            if (n.size() > 16) break;
-        }
+        STX_TRY(const auto n, numbersIn(given / poseName, job.limits, 16));
         if (n.size() != 16)
             return failAt(place, ErrorCode::invalidInput, "{} numbers; 4 rows of 4 are expected",
                           n.size());
@@ -90,13 +82,8 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
         v.cy = own ? k[3] + 0.5 : kColourY;
         v.width = size->x;
         v.height = size->y;
-        glm::dmat3 rotation;
-        for (int row = 0; row < 3; ++row) {
-            for (int column = 0; column < 3; ++column)
-                rotation[column][row] = n[static_cast<std::size_t>(row * 4 + column)];
-            v.centre[row] = n[static_cast<std::size_t>(row * 4 + 3)];
-        }
-        STX_TRY(v.worldFromCamera, repairRotation(rotation, v.fx, place, job));
+        v.centre = {n[3], n[7], n[11]};
+        STX_TRY(v.worldFromCamera, repairRotation(rotationOfRows(n), v.fx, place, job));
         if (depth) {
             // The pose is that of the depth.
             v.worldFromCamera = v.worldFromCamera * glm::transpose(depth->turn);

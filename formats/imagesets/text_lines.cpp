@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "formats/files/messages.hpp"
 #include "lib/base/whole_number.hpp"
 
 namespace stx::imagesets {
@@ -52,6 +53,21 @@ Result<std::vector<double>> numbersOf(const std::vector<std::string_view>& words
     for (std::size_t i = 0; i < count; ++i) {
         STX_TRY(const double value, numberOf(words[first + i], where));
         out.push_back(value);
+    }
+    return out;
+}
+
+Result<std::vector<double>> numbersIn(const std::filesystem::path& file, const Limits& limits,
+                                      std::size_t most) {
+    STX_TRY(const auto bytes, readFile(file, limits));
+    const std::string where = inQuotes(file.string());
+    std::vector<double> out;
+    for (const TextLine& line : linesOf(textOf(bytes))) {
+        if (out.size() > most) break;
+        for (const auto word : line.words()) {
+            STX_TRY(const double value, within(where, numberOf(word, line.where())));
+            out.push_back(value);
+        }
     }
     return out;
 }

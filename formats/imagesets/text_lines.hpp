@@ -29,5 +29,9 @@ struct TextLine {
 [[nodiscard]] Result<std::vector<double>> numbersOf(const std::vector<std::string_view>& words,
                                                     std::size_t first, std::size_t count,
                                                     const std::string& where);
+/// All numbers of a text file; lines are read until there are more than `most`.
+[[nodiscard]] Result<std::vector<double>> numbersIn(const std::filesystem::path& file,
+                                                    const Limits& limits,
+                                                    std::size_t most = SIZE_MAX);
 
 }  // namespace stx::imagesets

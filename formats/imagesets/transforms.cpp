@@ -244,7 +244,7 @@ Result<std::vector<SetView>> transformsViews(const Json& file, Job& job) {
 Result<SetDescription> describeTransforms(const path& given, const ImageSetOptions&, Job& job) {
     std::error_code ec;
     const path file = std::filesystem::is_directory(given, ec) ? given / "transforms.json" : given;
-    const path folder = file.has_parent_path() ? file.parent_path() : path(".");
+    const path folder = folderOf(file);
     const std::string where = inQuotes(file.string());
     STX_TRY(const Json json, readJson(file, job.limits));
     if (jsonKindOf(json) != JsonKind::transforms)

@@ -1,6 +1,5 @@
 #include "formats/imagesets/two_cameras.hpp"
 
-#include "formats/files/files.hpp"
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/text_lines.hpp"
 
@@ -10,15 +9,7 @@ namespace {
 /// Reads the rows of R | t, with or without the last row 0 0 0 1.
 Result<void> readMotion(const std::string& file, DepthCamera& depth, Job& job) {
     const std::string where = inQuotes(file);
-    STX_TRY(const auto bytes, readFile(file, job.limits));
-    std::vector<double> n;
-    for (const TextLine& line : linesOf(textOf(bytes))) {
-        for (const auto word : line.words()) {
-            STX_TRY(const double value, within(where, numberOf(word, line.where())));
-            n.push_back(value);
-        }
-        if (n.size() > 16) break;
-    }
+    STX_TRY(const auto n, numbersIn(file, job.limits, 16));
     if (n.size() != 12 && n.size() != 16)
         return failAt(where, ErrorCode::invalidInput,
                       "{} numbers; 3 or 4 rows of 4 (a rotation and a shift, from the depth camera "
@@ -28,13 +19,8 @@ Result<void> readMotion(const std::string& file, DepthCamera& depth, Job& job) {
         return failAt(where, ErrorCode::invalidInput,
                       "the last row is {:g} {:g} {:g} {:g}; 0 0 0 1 is expected", n[12], n[13],
                       n[14], n[15]);
-    glm::dmat3 turn;
-    for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 3; ++column)
-            turn[column][row] = n[static_cast<std::size_t>(row * 4 + column)];
-        depth.shift[row] = n[static_cast<std::size_t>(row * 4 + 3)];
-    }
-    STX_TRY(depth.turn, repairRotation(turn, depth.fx, where, job));
+    depth.shift = {n[3], n[7], n[11]};
+    STX_TRY(depth.turn, repairRotation(rotationOfRows(n), depth.fx, where, job));
     return {};
 }
 

@@ -47,13 +47,39 @@ void copyVertex(std::vector<T>& values, std::uint32_t from) {
     if (!values.empty()) values.push_back(T(values[from]));
 }
 
+constexpr glm::vec3 kNoNormal{0.0f};
+
+/// Gives the corners of triangles for which missing(vertex) the normal of their face. A vertex that
+/// has another face's already is copied: position and normal here, all else by copyOthers(vertex).
+template <class Missing, class CopyOthers>
+void giveFaceNormals(std::vector<glm::dvec3>& positions, std::vector<glm::uvec3>& triangles,
+                     std::vector<glm::vec3>& normals, const Missing& missing,
+                     const CopyOthers& copyOthers) {
+    for (auto& t : triangles) {
+        const auto area = areaNormal(positions, t);
+        if (area == glm::dvec3(0.0)) continue;
+        const glm::vec3 face(glm::normalize(area));
+        for (int k = 0; k < 3; ++k) {
+            const auto v = t[k];
+            if (!missing(v)) continue;
+            if (normals[v] != kNoNormal && normals[v] != face) {
+                t[k] = static_cast<std::uint32_t>(positions.size());
+                copyVertex(positions, v);
+                copyVertex(normals, v);
+                copyOthers(v);
+            }
+            normals[t[k]] = face;
+        }
+    }
+    for (auto& n : normals)
+        if (n == kNoNormal) n = glm::vec3(0, 0, 1);
+}
+
 /// The uvs that textures have of their own, in a part and in the mesh.
 constexpr std::pair<std::vector<glm::vec2> MeshPart::*, std::vector<glm::vec2> Mesh::*> kOwnUvs[] =
     {{&MeshPart::normalUvs, &Mesh::normalUvs},
      {&MeshPart::metallicRoughnessUvs, &Mesh::metallicRoughnessUvs},
      {&MeshPart::emissiveUvs, &Mesh::emissiveUvs}};
-
-constexpr glm::vec3 kNoNormal{0.0f};
 
 }  // namespace
 
@@ -240,27 +266,15 @@ void MeshBuilder::fillNormals() {
     if (mesh_.normals.empty()) return;
     std::vector<bool> given(positions_.size());
     for (std::size_t i = 0; i < given.size(); ++i) given[i] = mesh_.normals[i] != kNoNormal;
-    for (auto& t : mesh_.triangles) {
-        if (given[t.x] && given[t.y] && given[t.z]) continue;
-        const glm::vec3 face(glm::normalize(areaNormal(positions_, t)));
-        for (int k = 0; k < 3; ++k) {
-            const auto v = t[k];
-            if (v < given.size() && given[v]) continue;
-            if (mesh_.normals[v] != kNoNormal && mesh_.normals[v] != face) {
-                t[k] = static_cast<std::uint32_t>(positions_.size());
-                copyVertex(positions_, v);
-                copyVertex(mesh_.normals, v);
-                copyVertex(mesh_.tangents, v);
-                copyVertex(mesh_.colours, v);
-                copyVertex(mesh_.uvs, v);
-                for (const auto& [_, own] : kOwnUvs) copyVertex(mesh_.*own, v);
-            }
-            mesh_.normals[t[k]] = face;
-        }
-    }
-    for (auto& n : mesh_.normals) {
-        if (n == kNoNormal) n = glm::vec3(0, 0, 1);
-    }
+    giveFaceNormals(
+        positions_, mesh_.triangles, mesh_.normals,
+        [&](std::uint32_t v) { return v >= given.size() || !given[v]; },
+        [&](std::uint32_t v) {
+            copyVertex(mesh_.tangents, v);
+            copyVertex(mesh_.colours, v);
+            copyVertex(mesh_.uvs, v);
+            for (const auto& [_, own] : kOwnUvs) copyVertex(mesh_.*own, v);
+        });
 }
 
 /// Doubles become floats, from an origin where floats would lose too much.
@@ -337,27 +351,14 @@ Result<Mesh> MeshBuilder::finish() {
 
 void addFlatNormals(MeshPart& part) {
     part.normals.assign(part.positions.size(), kNoNormal);
-    for (auto& t : part.triangles) {
-        const auto area = areaNormal(part.positions, t);
-        if (area == glm::dvec3(0.0)) continue;
-        const glm::vec3 face(glm::normalize(area));
-        for (int k = 0; k < 3; ++k) {
-            const auto v = t[k];
-            if (part.normals[v] != kNoNormal && part.normals[v] != face) {
-                t[k] = static_cast<std::uint32_t>(part.positions.size());
-                copyVertex(part.positions, v);
-                copyVertex(part.normals, v);
-                copyVertex(part.tangents, v);
-                copyVertex(part.colours, v);
-                copyVertex(part.uvs, v);
-                for (const auto& [own, _] : kOwnUvs) copyVertex(part.*own, v);
-            }
-            part.normals[t[k]] = face;
-        }
-    }
-    for (auto& n : part.normals) {
-        if (n == kNoNormal) n = glm::vec3(0, 0, 1);
-    }
+    giveFaceNormals(
+        part.positions, part.triangles, part.normals, [](std::uint32_t) { return true; },
+        [&](std::uint32_t v) {
+            copyVertex(part.tangents, v);
+            copyVertex(part.colours, v);
+            copyVertex(part.uvs, v);
+            for (const auto& [own, _] : kOwnUvs) copyVertex(part.*own, v);
+        });
 }
 
 void addTangents(MeshPart& part) {

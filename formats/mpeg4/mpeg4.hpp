@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <string_view>
 
 #include "formats/files/files.hpp"
 #include "formats/mpeg4/bifs/bifs.hpp"

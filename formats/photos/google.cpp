@@ -1,8 +1,6 @@
 // Google's two ways: GDepth, with the depth as base64 in the XMP, and Dynamic Depth, whose depth is
 // a JPEG behind the first one.
 
-#include <algorithm>
-
 #include "formats/files/base64.hpp"
 #include "formats/files/text_numbers.hpp"
 #include "formats/photos/readers.hpp"

@@ -1,6 +1,5 @@
 #include "formats/photos/heif_boxes.hpp"
 
-#include <algorithm>
 #include <optional>
 
 #include "formats/files/byte_io.hpp"

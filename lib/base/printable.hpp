@@ -15,4 +15,7 @@ namespace stx {
 /// The same for text of several lines: ends of lines stay.
 [[nodiscard]] std::string printableLines(std::string_view text);
 
+/// printable() text in an element of XML.
+[[nodiscard]] std::string xmlText(std::string_view text);
+
 }  // namespace stx

@@ -40,7 +40,8 @@ struct RasterImage {
 [[nodiscard]] Mesh pointsAsDiscs(const Mesh& mesh, const Camera& camera, float radius);
 
 /// Radius that closes the gaps between the points of a point cloud: from the distances to the
-/// nearest neighbours; at most the triangles' usual side, where there are some. 0 when the mesh has no loose points.
+/// nearest neighbours; at most the triangles' usual side, where there are some. 0 when the mesh has
+/// no loose points.
 [[nodiscard]] float pointRadius(const Mesh& mesh);
 
 }  // namespace stx

@@ -56,21 +56,30 @@ void forEachPixel(const AtlasRectangle& r, glm::ivec2 viewSize, int around, cons
     }
 }
 
+/// Calls copy(image of `from`, the same image of `to`) for all that `from` has; one is a view and
+/// the other a page.
+template <class From, class To, class Copy>
+void copyImages(const From& from, To& to, const Copy& copy) {
+    if (const auto* colour = from.texture.rgba8()) copy(*colour, *to.texture.rgba8());
+    if (const auto* colour = from.texture.rgbaFloat()) copy(*colour, *to.texture.rgbaFloat());
+    copy(from.depth, to.depth);
+    const auto further = [&](const auto& image, auto& other) {
+        if (!image.empty()) copy(image, other);
+    };
+    further(from.normal, to.normal);
+    if (!from.splatU.empty() && !from.splatV.empty()) {
+        copy(from.splatU, to.splatU);
+        copy(from.splatV, to.splatV);
+    }
+    further(from.metallicRoughness, to.metallicRoughness);
+    further(from.emissive, to.emissive);
+}
+
 void fillPage(const ReferenceView& view, const AtlasRectangle& r, int padding, AtlasPage& page) {
-    const auto copy = [&](const auto& from, auto& to) {
+    copyImages(view, page, [&](const auto& from, auto& to) {
         forEachPixel(r, view.depth.size(), padding,
                      [&](glm::ivec2 p, glm::ivec2 v) { to.at(p.x, p.y) = from.at(v.x, v.y); });
-    };
-    if (const auto* colour = view.texture.rgba8()) copy(*colour, *page.texture.rgba8());
-    if (const auto* colour = view.texture.rgbaFloat()) copy(*colour, *page.texture.rgbaFloat());
-    copy(view.depth, page.depth);
-    if (view.hasNormals()) copy(view.normal, page.normal);
-    if (view.hasSplats()) {
-        copy(view.splatU, page.splatU);
-        copy(view.splatV, page.splatV);
-    }
-    if (!view.metallicRoughness.empty()) copy(view.metallicRoughness, page.metallicRoughness);
-    if (!view.emissive.empty()) copy(view.emissive, page.emissive);
+    });
 }
 
 /// Images, zero everywhere, of all that the views have beside colour and depth; `to` is a page or
@@ -394,22 +403,11 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
         std::int64_t covered = 0;
         for (const AtlasRectangle* r : ofView[i]) {
             const AtlasPage& page = atlas.pages[r->page];
-            const auto copy = [&](const auto& from, auto& to) {
+            copyImages(page, view, [&](const auto& from, auto& to) {
                 forEachPixel(*r, view.depth.size(), 0, [&](glm::ivec2 p, glm::ivec2 v) {
                     to.at(v.x, v.y) = from.at(p.x, p.y);
                 });
-            };
-            if (const auto* colour = page.texture.rgba8()) copy(*colour, *view.texture.rgba8());
-            if (const auto* colour = page.texture.rgbaFloat())
-                copy(*colour, *view.texture.rgbaFloat());
-            copy(page.depth, view.depth);
-            if (contents.normals) copy(page.normal, view.normal);
-            if (contents.splats) {
-                copy(page.splatU, view.splatU);
-                copy(page.splatV, view.splatV);
-            }
-            if (contents.metallicRoughness) copy(page.metallicRoughness, view.metallicRoughness);
-            if (contents.emissive) copy(page.emissive, view.emissive);
+            });
             forEachPixel(*r, view.depth.size(), 0, [&](glm::ivec2, glm::ivec2 v) {
                 covered += given.at(v.x, v.y) == 2 ? 0 : 1;
                 given.at(v.x, v.y) = 2;

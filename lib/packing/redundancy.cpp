@@ -208,7 +208,7 @@ void findPartners(std::vector<PruneView>& views, const std::vector<int>& rank) {
     parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
         PruneView& p = views[i];
         for (const int j : rank) {
-            // What shows now and what is remembered do not stand for each other.
+            // What shows now and what is remembered must not replace each other.
             const bool alike = views[j].background == p.background;
             if (j != i && alike && mayShow(views[j], p)) p.partners.push_back(j);
         }

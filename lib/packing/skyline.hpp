@@ -44,6 +44,26 @@ class Skyline {
     struct Segment {
         int x, y, width;
     };
+    /// The lowest segment, and how far its neighbours rise above it.
+    struct Gap {
+        std::size_t at = 0;  ///< in segments_
+        Segment segment{};
+        int leftWall = 0, rightWall = 0;
+    };
+    /// What goes into a gap.
+    struct Fit {
+        int before = -1;  ///< position in next_; -1 = nothing fits
+        int width = 0, height = 0;
+        bool turned = false;
+    };
+    [[nodiscard]] Gap lowestGap() const;
+    /// `narrowest`: the width of the narrowest rectangle.
+    [[nodiscard]] Fit fitFor(const Gap& gap, int maxHeight, GapRule rule, bool mayTurn,
+                             int narrowest) const;
+    void cover(const Gap& gap, const Fit& fit, bool atLeft);
+    /// Joins neighbours of one height around a segment.
+    void join(std::size_t at);
+
     const std::vector<RectangleGroup>& groups_;
     std::vector<Segment> segments_;
     std::vector<glm::ivec2> sizes_;  ///< of the groups, in the order

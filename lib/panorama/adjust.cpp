@@ -20,8 +20,29 @@ constexpr double kStretchSpread = 0.01;
 /// Unknowns of a pair: turn of a (3), of b (3), logarithm of the focal length, k1 / focal^2; with
 /// own focal lengths those of a and of b.
 constexpr std::size_t kShared = 8, kOwn = 10;
-/// For derivatives of focal lengths and distortion.
+/// Numbers of these unknowns in a block's equations; the turns of a and b begin at 0 and 3.
+constexpr std::size_t kTurnOfB = 3, kFocal = 6, kDistortion = 7, kStretchOfA = 8, kStretchOfB = 9;
+/// The step of derivatives by differences: of the logarithm of a focal length, and of the share by
+/// which the distortion moves the corner. Small, but far above what rounding leaves.
 constexpr double kSmallStep = 1e-6;
+/// A match behind the other camera costs as much as one that is a whole diagonal off; squared,
+/// halves of the diagonal.
+constexpr double kBehindCamera = 4;
+/// The most by which one step may change the logarithm of the focal length of all pictures, and the
+/// largest values that it leaves to a picture's own one and to the distortion (a share of the
+/// distance of the corner): the equations are linear, and true nearby only.
+constexpr double kMostFocalStep = 0.2, kMostStretch = 0.1, kMostDistortion = 0.25;
+/// Damping (Levenberg and Marquardt), a share of each equation's own weight: at first, at least,
+/// and what it is multiplied by after a step that made the cost less or more.
+constexpr double kFirstDamping = 1e-4, kLeastDamping = 1e-9, kDampLess = 0.2, kDampMore = 8;
+/// A step that does not make the cost less is tried again so often, with more damping.
+constexpr int kDampingTries = 8;
+/// Added to each equation's own weight, so that what no match says anything about stays.
+constexpr double kStays = 1e-9;
+/// Steps end where one makes the cost less by less than this share.
+constexpr double kSettledShare = 1e-7;
+/// The difference of a match that one of the pictures cannot see, pixels: larger than any other.
+constexpr double kNotSeen = 1e9;
 
 struct Block {
     std::array<double, kOwn * kOwn> matrix{};
@@ -62,8 +83,7 @@ void addSide(Block& block, glm::dmat3 worldFromFrom, glm::dmat3 worldFromTo, glm
         const glm::dvec3 r = w * worldFromTo;  // transposed: to camera space
         const auto p = lensesTo[l == 1 ? 0 : l].position(r);
         if (!p) {
-            // Behind the camera: as bad as a match that is a whole picture off.
-            if (l == 0) block.cost += robust(4 / (s.pixel * s.pixel), s);
+            if (l == 0) block.cost += robust(kBehindCamera / (s.pixel * s.pixel), s);
             return;
         }
         seen[l] = *p;
@@ -97,15 +117,15 @@ void addSide(Block& block, glm::dmat3 worldFromFrom, glm::dmat3 worldFromTo, glm
         auto& own = j[static_cast<std::size_t>(row)];
         for (int i = 0; i < 3; ++i) {
             own[static_cast<std::size_t>(i)] = fromIsA ? byTurn[i] : -byTurn[i];
-            own[static_cast<std::size_t>(3 + i)] = -own[static_cast<std::size_t>(i)];
+            own[kTurnOfB + static_cast<std::size_t>(i)] = -own[static_cast<std::size_t>(i)];
         }
         const double byFrom = (seen[1][row] - seen[0][row]) / (s.pixel * kSmallStep);
         // The distortion stays where it is in the picture.
         const double byTo = (1 + 3 * lens.k1 * r2) * lens.focal * plane[row] / s.pixel;
-        own[6] = byFrom + byTo;
-        own[7] = (seen[2][row] - seen[0][row]) / (s.pixel * kSmallStep);
-        own[8] = fromIsA ? byFrom : byTo;
-        own[9] = fromIsA ? byTo : byFrom;
+        own[kFocal] = byFrom + byTo;
+        own[kDistortion] = (seen[2][row] - seen[0][row]) / (s.pixel * kSmallStep);
+        own[kStretchOfA] = fromIsA ? byFrom : byTo;
+        own[kStretchOfB] = fromIsA ? byTo : byFrom;
         const std::size_t count = s.ownFocals ? kOwn : kShared;
         for (std::size_t a = 0; a < count; ++a) {
             block.right[a] -= weight * own[a] * e[row];
@@ -181,12 +201,12 @@ struct Unknowns {
         std::array<std::size_t, kOwn> index{};
         for (std::size_t i = 0; i < 3; ++i) {
             index[i] = turn[a] == SIZE_MAX ? SIZE_MAX : turn[a] + i;
-            index[3 + i] = turn[b] == SIZE_MAX ? SIZE_MAX : turn[b] + i;
+            index[kTurnOfB + i] = turn[b] == SIZE_MAX ? SIZE_MAX : turn[b] + i;
         }
-        index[6] = s.fixFocal ? SIZE_MAX : focal;
-        index[7] = s.fixDistortion ? SIZE_MAX : corner;
-        index[8] = stretch[a];
-        index[9] = stretch[b];
+        index[kFocal] = s.fixFocal ? SIZE_MAX : focal;
+        index[kDistortion] = s.fixDistortion ? SIZE_MAX : corner;
+        index[kStretchOfA] = stretch[a];
+        index[kStretchOfB] = stretch[b];
         return index;
     }
 };
@@ -230,8 +250,7 @@ Equations equationsOf(const TurnModel& model, const std::vector<Pair>& pairs,
     return e;
 }
 
-/// The model after a step; steps of the lens are held back, since the equations are true nearby
-/// only.
+/// The model after a step, of which the lens takes no more than is allowed.
 TurnModel movedBy(const TurnModel& model, const std::vector<double>& step, const Unknowns& at,
                   const AdjustSettings& s) {
     TurnModel moved = model;
@@ -241,10 +260,13 @@ TurnModel movedBy(const TurnModel& model, const std::vector<double>& step, const
             moved.worldFromCamera[c] = glm::normalize(quatOf({step[t], step[t + 1], step[t + 2]}) *
                                                       moved.worldFromCamera[c]);
         if (at.stretch[c] != SIZE_MAX)
-            moved.stretch[c] = std::clamp(moved.stretch[c] + step[at.stretch[c]], -0.1, 0.1);
+            moved.stretch[c] =
+                std::clamp(moved.stretch[c] + step[at.stretch[c]], -kMostStretch, kMostStretch);
     }
-    const double logFocal = std::log(model.lens.focal) + std::clamp(step[at.focal], -0.2, 0.2);
-    moved.lens = lensOf(logFocal, std::clamp(cornerOf(model) + step[at.corner], -0.25, 0.25));
+    const double logFocal =
+        std::log(model.lens.focal) + std::clamp(step[at.focal], -kMostFocalStep, kMostFocalStep);
+    moved.lens = lensOf(
+        logFocal, std::clamp(cornerOf(model) + step[at.corner], -kMostDistortion, kMostDistortion));
     if (s.fixFocal) moved.lens.focal = model.lens.focal;
     if (s.fixDistortion) moved.lens.k1 = model.lens.k1;
     return moved;
@@ -256,16 +278,16 @@ TurnModel movedBy(const TurnModel& model, const std::vector<double>& step, const
 double adjust(TurnModel& model, const std::vector<Pair>& pairs, const AdjustSettings& s) {
     const Unknowns at(model, s);
     if (s.ownFocals) model.stretch.resize(model.known.size(), 0.0);
-    double damping = 1e-4;
+    double damping = kFirstDamping;
     double cost = costOf(model, pairs, s);
     for (int iteration = 0; iteration < s.iterations; ++iteration) {
         const Equations equations = equationsOf(model, pairs, s, at);
         bool better = false;
         double gain = 0;
-        for (int tries = 0; tries < 8 && !better; ++tries) {
+        for (int tries = 0; tries < kDampingTries && !better; ++tries) {
             auto [damped, step] = equations;
             for (std::size_t i = 0; i < at.count; ++i)
-                damped[i * at.count + i] += damping * equations.matrix[i * at.count + i] + 1e-9;
+                damped[i * at.count + i] += damping * equations.matrix[i * at.count + i] + kStays;
             if (solveSymmetric(damped, step)) {
                 TurnModel moved = movedBy(model, step, at, s);
                 const double now = costOf(moved, pairs, s);
@@ -276,9 +298,9 @@ double adjust(TurnModel& model, const std::vector<Pair>& pairs, const AdjustSett
                     better = true;
                 }
             }
-            damping = better ? std::max(damping * 0.2, 1e-9) : damping * 8;
+            damping = better ? std::max(damping * kDampLess, kLeastDamping) : damping * kDampMore;
         }
-        if (!better || gain < 1e-7 * cost) break;
+        if (!better || gain < kSettledShare * cost) break;
     }
     return cost;
 }
@@ -292,7 +314,7 @@ std::optional<glm::dvec2> seenBy(const TurnModel& model, int a, int b, glm::dvec
 double differenceOf(const TurnModel& model, const Pair& pair, const Match& match, double pixel) {
     const auto inB = seenBy(model, pair.a, pair.b, match.a);
     const auto inA = seenBy(model, pair.b, pair.a, match.b);
-    if (!inA || !inB) return 1e9;
+    if (!inA || !inB) return kNotSeen;
     return 0.5 * (glm::distance(*inA, match.a) + glm::distance(*inB, match.b)) / pixel;
 }
 

@@ -25,7 +25,7 @@ struct TurnModel {
 };
 
 struct AdjustSettings {
-    double pixel = 1e-3;     ///< of the pictures as they were matched, halves of the diagonal
+    double pixel = 1e-3;     ///< size of a pixel of the work copies, halves of the diagonal
     double huberPixels = 2;  ///< beyond this, differences count linearly (Huber 1964)
     /// Beyond that they count by their logarithm, as Cauchy's distribution has them: what half of
     /// the matches agree on wins, once it is near.
@@ -37,7 +37,7 @@ struct AdjustSettings {
     double focalSpread = 0.3;  ///< how near: standard deviation of the logarithm
     /// Differences that matches have, pixels: the less, the less what is expected counts.
     double noisePixels = 1;
-    int iterations = 40;
+    int iterations = 40;  ///< steps at most
 };
 
 /// Block adjustment (Shum and Szeliski 2000; Brown and Lowe 2007): moves all known rotations, the

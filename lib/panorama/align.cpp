@@ -16,6 +16,7 @@ using namespace panorama;
 
 namespace {
 
+/// Pictures of a panorama at most: every two are compared, which takes time by their square.
 constexpr int kMostPictures = 500;
 /// Features of a picture: one for so many pixels of its copy, at least and at most.
 constexpr std::size_t kPixelsOfFeature = 350, kFewestFeatures = 450, kMostFeatures = 900;
@@ -45,8 +46,36 @@ constexpr double kAfterPatches[] = {4, 1};  ///< as kCoarseToFine
 /// as patches are aligned.
 constexpr double kFits[] = {3, 2, 1.3, 0.75};
 constexpr double kFitHuber = 0.5;  ///< in these adjustments, as kCoarseToFine
-/// Parallax below this is not told: pixels, and a share of the diagonal.
+/// Parallax below this is not noted: pixels, and a share of the diagonal.
 constexpr double kLeastParallax = 2, kParallaxShare = 1e-3;
+
+/// Focal lengths that are tried where none is known, halves of the diagonal: fields of view of 110
+/// to 21 degrees across it, each so many times the one before.
+constexpr double kShortestFocal = 0.7, kLongestFocal = 5.5, kFocalStep = 1.15;
+/// Those that are tried around one that EXIF tells, as shares of it: it may be some percent off.
+constexpr double kAroundHint[] = {0.93, 1.0, 1.07};
+/// Pictures may overlap where at least so many places of a grid (so many along each side) over one,
+/// which reaches to 0.95 of its width and height, are seen in the other.
+constexpr int kFewestSeen = 3, kGridOfOverlap = 9;
+constexpr double kGridReach = 4.2;  ///< steps of the grid from the middle to the border
+/// Matches of a pair stay that are off by no more than so many times its median, and in any case by
+/// no more than this, work pixels.
+constexpr double kFitOfMedian = 2.5, kAlwaysFits = 0.7;
+/// What differences are when a pair has no matches: larger than any.
+constexpr double kNoMatches = 1e9;
+/// Nine tenths of values that are normally distributed in two dimensions are within so many
+/// standard deviations.
+constexpr double kDeviationsOfMost = 2.15;
+/// How far matches may be off on the whole, pixels, at least and at most: what is expected of a
+/// lens counts for something always, and never for all.
+constexpr double kLeastNoise = 0.01, kMostNoise = 20;
+/// Differences beyond which matches count less (Cauchy) where they are brought to what most agree
+/// on, work pixels, one adjustment for each.
+constexpr double kToMost[] = {2, 1, 0.5};
+/// Pairs with fewer matches say nothing of parallax.
+constexpr int kFewestOfParallax = 8;
+/// Names of pictures that a note lists; it counts the others.
+constexpr std::size_t kMostNames = 4;
 
 /// A field of view that is given is another one than that of a closed turn from this share of the
 /// focal length on. The tests ask it to be noted from 3 % on; nothing finer was measured.
@@ -64,29 +93,42 @@ struct Series {
     AdjustSettings adjusting;
 };
 
-/// Fields of view of 21 to 110 degrees across the diagonal.
+/// Halves of the diagonal; `hint`: what EXIF tells or was given, 0 = nothing.
 std::vector<double> focalsToTry(double hint) {
     std::vector<double> focals;
-    for (double f = 0.7; f < 5.5; f *= 1.15) focals.push_back(f);
+    for (double f = kShortestFocal; f < kLongestFocal; f *= kFocalStep) focals.push_back(f);
     if (hint > 0)
-        for (const double f : {0.93, 1.0, 1.07}) focals.push_back(f * hint);
+        for (const double f : kAroundHint) focals.push_back(f * hint);
     return focals;
 }
 
 /// Rotations, focal length and distortion of all that belong together, from coarse to fine.
-void adjustCoarseToFine(Series& s) {
+void adjustCoarseToFine(TurnModel& model, const std::vector<Pair>& pairs,
+                        AdjustSettings& adjusting) {
     for (const double pixels : kCoarseToFine) {
-        s.adjusting.huberPixels = pixels;
-        s.adjusting.fixDistortion = pixels > kDistortionBelow;
-        adjust(s.model, s.pairs, s.adjusting);
+        adjusting.huberPixels = pixels;
+        adjusting.fixDistortion = pixels > kDistortionBelow;
+        adjust(model, pairs, adjusting);
     }
 }
 
-double medianDifference(const Series& s, const Pair& pair) {
+/// By how much the matches of a pair are off, multiples of `pixel` (halves of the diagonal).
+std::vector<double> differencesOf(const Series& s, const Pair& pair, double pixel) {
     std::vector<double> differences;
     for (const Match& m : pair.matches)
-        differences.push_back(differenceOf(s.model, pair, m, s.adjusting.pixel));
-    return medianOf(std::move(differences), 1e9);
+        differences.push_back(differenceOf(s.model, pair, m, pixel));
+    return differences;
+}
+
+double medianDifference(const Series& s, const Pair& pair) {
+    return medianOf(differencesOf(s, pair, s.adjusting.pixel), kNoMatches);
+}
+
+/// The pair of the same two pictures; the end where there is none.
+template <class Pairs>
+auto findSame(Pairs& pairs, const Pair& pair) {
+    return std::find_if(pairs.begin(), pairs.end(),
+                        [&](const Pair& p) { return p.a == pair.a && p.b == pair.b; });
 }
 
 /// Drops pairs that do not fit to the others; true when there were some.
@@ -104,12 +146,15 @@ bool mayOverlap(const Series& s, int a, int b) {
     const auto& copy = s.copies[static_cast<std::size_t>(a)];
     const glm::dvec2 other = s.copies[static_cast<std::size_t>(b)].extent(), own = copy.extent();
     int seen = 0;
-    for (int y = 0; y < 9; ++y)
-        for (int x = 0; x < 9; ++x) {
-            const auto p = seenBy(s.model, a, b, own * glm::dvec2((x - 4) / 4.2, (y - 4) / 4.2));
+    constexpr int kMiddle = kGridOfOverlap / 2;
+    for (int y = 0; y < kGridOfOverlap; ++y)
+        for (int x = 0; x < kGridOfOverlap; ++x) {
+            const auto p =
+                seenBy(s.model, a, b,
+                       own * glm::dvec2((x - kMiddle) / kGridReach, (y - kMiddle) / kGridReach));
             seen += p && std::abs(p->x) < other.x && std::abs(p->y) < other.y;
         }
-    return seen >= 3;
+    return seen >= kFewestSeen;
 }
 
 /// Matches of patches for all pairs that overlap; those of features where patches say too little.
@@ -144,9 +189,7 @@ Result<void> matchPatches(Series& s, const std::vector<Pair>& fromFeatures,
     });
     STX_CHECK(job.checkCancelled());
     for (const Pair& old : fromFeatures) {
-        const auto it = std::find_if(pairs.begin(), pairs.end(), [&](const Pair& pair) {
-            return pair.a == old.a && pair.b == old.b;
-        });
+        const auto it = findSame(pairs, old);
         if (it == pairs.end()) continue;
         if (it->matches.size() < kFewPatches)
             it->matches.insert(it->matches.end(), old.matches.begin(), old.matches.end());
@@ -159,7 +202,8 @@ Result<void> matchPatches(Series& s, const std::vector<Pair>& fromFeatures,
 /// Matches far from what all agree on are movers, parallax and mistakes.
 void keepWhatFits(Series& s, double most) {
     for (Pair& pair : s.pairs) {
-        const double limit = std::clamp(2.5 * medianDifference(s, pair), 0.7, most);
+        const double limit =
+            std::clamp(kFitOfMedian * medianDifference(s, pair), kAlwaysFits, most);
         std::erase_if(pair.matches, [&](const Match& m) {
             return differenceOf(s.model, pair, m, s.adjusting.pixel) > limit;
         });
@@ -167,41 +211,38 @@ void keepWhatFits(Series& s, double most) {
     std::erase_if(s.pairs, [](const Pair& pair) { return pair.matches.size() < kFewestMatches; });
 }
 
-/// What differs between two pictures is parallax and shapes of lenses more than noise: matches of a
-/// pair say the same about the lens, so that all of them together count as this many.
-constexpr double kOwnOpinions = 12;
+/// What is left between two pictures is parallax and the lens more than noise, and all matches of a
+/// pair are off by that together: they count as so many that are independent.
+constexpr double kIndependentMatches = 12;
 
 /// How far matches are off, pixels, as if each were independent of the others.
 double noiseOf(const Series& s) {
     double squares = 0, matches = 0;
     for (const Pair& pair : s.pairs) {
-        std::vector<double> differences;
-        for (const Match& m : pair.matches)
-            differences.push_back(differenceOf(s.model, pair, m, s.adjusting.pixel));
+        std::vector<double> differences = differencesOf(s, pair, s.adjusting.pixel);
         std::sort(differences.begin(), differences.end());
-        // Nine tenths of a bell in two dimensions are within 2.15 standard deviations.
-        const double off = differences[differences.size() * 9 / 10] / 2.15;
+        const double off = differences[differences.size() * 9 / 10] / kDeviationsOfMost;
         squares += off * off;
         matches += static_cast<double>(differences.size());
     }
     const double pairs = std::max(1.0, static_cast<double>(s.pairs.size()));
-    return std::clamp(std::sqrt(squares / pairs * std::max(1.0, matches / pairs / kOwnOpinions)),
-                      0.01, 20.0);
+    return std::clamp(
+        std::sqrt(squares / pairs * std::max(1.0, matches / pairs / kIndependentMatches)),
+        kLeastNoise, kMostNoise);
 }
 
 /// Half of all matches differ by no more than this, work pixels.
 double medianOfAll(const Series& s) {
-    std::vector<double> differences;
+    std::vector<double> all;
     for (const Pair& pair : s.pairs)
-        for (const Match& m : pair.matches)
-            differences.push_back(differenceOf(s.model, pair, m, s.adjusting.pixel));
-    return medianOf(std::move(differences), 1e9);
+        for (const double d : differencesOf(s, pair, s.adjusting.pixel)) all.push_back(d);
+    return medianOf(std::move(all), kNoMatches);
 }
 
 /// Where half of the matches or less are right, brings together what agrees.
 void adjustToMost(Series& s) {
     s.adjusting.cauchy = true;
-    for (const double pixels : {2.0, 1.0, 0.5}) {
+    for (const double pixels : kToMost) {
         s.adjusting.huberPixels = pixels;
         adjust(s.model, s.pairs, s.adjusting);
     }
@@ -211,6 +252,8 @@ void adjustToMost(Series& s) {
 /// Cameras that focus anew have another focal length then: each picture gets its own where that
 /// brings matches clearly nearer to each other.
 void tryOwnFocals(Series& s) {
+    // A share of the median difference before; and where that is less, work pixels, there is
+    // nothing to win.
     constexpr double kNearer = 0.8, kNearEnough = 0.1;
     const double before = medianOfAll(s);
     if (before < kNearEnough) return;
@@ -231,9 +274,8 @@ void describePairs(const Series& s, const std::vector<Pair>& before, PanoramaAli
             0.5 * (s.copies[static_cast<std::size_t>(pair.a)].fullHalfDiagonal() +
                    s.copies[static_cast<std::size_t>(pair.b)].fullHalfDiagonal());
         const auto differences = [&](const Pair& of) {
-            std::vector<double> values;
-            for (const Match& m : of.matches)
-                values.push_back(differenceOf(s.model, of, m, 1.0) * fullPixel);
+            std::vector<double> values = differencesOf(s, of, 1.0);
+            for (double& value : values) value *= fullPixel;
             std::sort(values.begin(), values.end());
             return values;
         };
@@ -246,9 +288,7 @@ void describePairs(const Series& s, const std::vector<Pair>& before, PanoramaAli
         p.rms = std::sqrt(own / static_cast<double>(pair.matches.size()));
         squares += own;
         all += pair.matches.size();
-        const auto first = std::find_if(before.begin(), before.end(), [&](const Pair& b) {
-            return b.a == pair.a && b.b == pair.b;
-        });
+        const auto first = findSame(before, pair);
         const auto whole = differences(first == before.end() ? pair : *first);
         p.found = static_cast<int>(whole.size());
         p.parallax = whole[whole.size() * 9 / 10];
@@ -259,19 +299,19 @@ void describePairs(const Series& s, const std::vector<Pair>& before, PanoramaAli
 
 std::string listOf(const std::vector<std::string>& names) {
     std::string text;
-    for (std::size_t i = 0; i < names.size() && i < 4; ++i)
+    for (std::size_t i = 0; i < names.size() && i < kMostNames; ++i)
         text += (i == 0 ? "'" : ", '") + names[i] + "'";
-    if (names.size() > 4) text += fmt::format(" and {} more", names.size() - 4);
+    if (names.size() > kMostNames) text += fmt::format(" and {} more", names.size() - kMostNames);
     return text;
 }
 
-/// Says how large the parallax is, where it is.
-void tellParallax(const std::vector<PanoramaPair>& pairs, PictureSource& source, double pixels,
+/// Notes how large the parallax is, where it is more than `pixels`.
+void noteParallax(const std::vector<PanoramaPair>& pairs, PictureSource& source, double pixels,
                   bool focalGiven, Job& job) {
     const PanoramaPair* worst = nullptr;
     int some = 0;
     for (const auto& pair : pairs) {
-        if (pair.matches < 8 || pair.parallax < pixels) continue;
+        if (pair.matches < kFewestOfParallax || pair.parallax < pixels) continue;
         ++some;
         if (!worst || pair.parallax > worst->parallax) worst = &pair;
     }
@@ -316,7 +356,7 @@ Result<std::vector<int>> readPictures(PictureSource& source, Series& s, Job& job
     return twins;
 }
 
-/// The focal length that is given or that pictures tell, halves of the diagonal; 0 = none.
+/// The focal length that is given or that EXIF tells, halves of the diagonal; 0 = none.
 double focalHintOf(PictureSource& source, const PanoramaSettings& settings, const Series& s) {
     if (settings.fieldOfView > 0)
         return s.copies[0].extent().x / std::tan(0.5 * settings.fieldOfView);
@@ -369,23 +409,19 @@ std::optional<double> focalOfClosedTurn(const Series& s, const PairSearch& searc
     adjusting.fixFocal = false;
     adjusting.expectedFocal = model.lens.focal;
     adjusting.focalSpread = kUsualSpread;
-    for (const double pixels : kCoarseToFine) {
-        adjusting.huberPixels = pixels;
-        adjusting.fixDistortion = pixels > kDistortionBelow;
-        adjust(model, search.pairs, adjusting);
-    }
+    adjustCoarseToFine(model, search.pairs, adjusting);
     if (gapOf(model, search.pairs, closing, false) > kClosedGap) return std::nullopt;
     return model.lens.focal;
 }
 
-/// Says when a field of view that was given is not that of a closed turn: by pairs of their own,
-/// since few agree with one that is far off. Errors: cancelled.
-Result<void> tellOtherFocal(const Series& s, double given, Job& job) {
+/// Notes when a field of view that was given is not that of a closed turn. It is found from pairs
+/// of its own, since few agree with a field of view that is far off. Errors: cancelled.
+Result<void> noteOtherFocal(const Series& s, double given, Job& job) {
     STX_TRY(const auto found, searchPairs(s.copies, s.features, focalsToTry(given), job));
     const auto focal = focalOfClosedTurn(s, found);
     if (!focal || std::abs(*focal / given - 1) < kOtherFocal) return {};
     const auto degrees = [&](double f) {
-        return 2 * std::atan(s.copies[0].extent().x / f) * 180 / M_PI;
+        return glm::degrees(2 * std::atan(s.copies[0].extent().x / f));
     };
     job.note(
         fmt::format("a field of view of {:.1f}° is given, but the pictures close a full turn at "
@@ -401,7 +437,7 @@ Result<Start> startByFeatures(Series& s, const PanoramaSettings& settings, doubl
     const auto count = static_cast<int>(s.copies.size());
     STX_TRY(auto search, searchPairs(s.copies, s.features,
                                      given ? std::vector<double>{hint} : focalsToTry(hint), job));
-    if (given && settings.closeLoop) STX_CHECK(tellOtherFocal(s, hint, job));
+    if (given && settings.closeLoop) STX_CHECK(noteOtherFocal(s, hint, job));
     s.pairs = std::move(search.pairs);
     s.adjusting.fixFocal = given;
     s.adjusting.expectedFocal = hint > 0 ? hint : kUsualFocal;
@@ -427,7 +463,7 @@ Result<Start> startByFeatures(Series& s, const PanoramaSettings& settings, doubl
             }
             if (!closing.empty()) continue;
         }
-        adjustCoarseToFine(s);
+        adjustCoarseToFine(s.model, s.pairs, s.adjusting);
         focal = s.model.lens.focal;
         if (!dropWrongPairs(s)) break;
     }
@@ -546,7 +582,7 @@ Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSet
         out.gapAfter = gapOf(s.model, s.pairs, closing, false);
     }
     describeCameras(s, settings.up, out);
-    tellParallax(out.pairs, source, std::max(kLeastParallax, 2 * kParallaxShare * largest),
+    noteParallax(out.pairs, source, std::max(kLeastParallax, 2 * kParallaxShare * largest),
                  focalGiven, job);
     return out;
 }

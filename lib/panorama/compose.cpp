@@ -16,6 +16,20 @@ using namespace panorama;
 
 namespace {
 
+/// A picture is reduced before it is drawn where so many of its pixels and more are one of the
+/// panorama, and its filter is widened where they still are more than this.
+constexpr double kReducedFrom = 1.5, kWidenedFrom = 1.05;
+/// Cells around a footprint in which it is drawn, and with which rows are looked for: beyond the
+/// two by which labels go on, for rounding.
+constexpr int kAroundDrawn = 2, kAroundRows = 3;
+/// Pixels that pictures cover by less than this stay empty.
+constexpr float kLeastCoverage = 1e-3f;
+/// A panorama of its natural width has at least so many pixels, and a multiple of these.
+constexpr double kLeastWidth = 64;
+constexpr int kWidthStep = 4;
+/// The share of the memory that sums of a band of rows may take is one over this.
+constexpr std::uint64_t kBandShare = 4;
+
 /// A picture that is drawn with a cubic filter as wide as the distance of the panorama's pixels.
 class Drawn {
   public:
@@ -23,12 +37,12 @@ class Drawn {
         : lens_(lens) {
         // Pixels of the picture for each of the panorama, in the middle.
         double scale = camera.focal * 2 * M_PI / width;
-        const int less = std::max(1, static_cast<int>(scale / 1.5));
+        const int less = std::max(1, static_cast<int>(scale / kReducedFrom));
         copy_ = makeWorkCopy(std::move(picture),
                              less > 1 ? std::max(1, std::max(camera.size.x, camera.size.y) / less)
                                       : std::max(camera.size.x, camera.size.y));
         scale = std::max(1.0, scale * copy_.colour.width() / camera.size.x);
-        wide_ = scale > 1.05 ? static_cast<float>(scale) : 1.0f;
+        wide_ = scale > kWidenedFrom ? static_cast<float>(scale) : 1.0f;
         worldFromCamera_ = glm::mat3_cast(camera.worldFromCamera);
     }
 
@@ -61,6 +75,7 @@ class Drawn {
     }
 
   private:
+    /// Catmull and Rom's kernel.
     static float cubic(float t) {
         t = std::abs(t);
         if (t < 1) return (1.5f * t - 2.5f) * t * t + 1;
@@ -140,21 +155,87 @@ struct RowPixels {
     }
 };
 
+/// The four cells of the grid around pixels of a row: whether they show one picture, and how its
+/// light is corrected there.
+class CellsAround {
+  public:
+    CellsAround(const Footprint& print, int index, const Image<int>& labels,
+                const Image<glm::vec3>& correction)
+        : print_(print), index_(index), labels_(labels), correction_(correction) {}
+
+    /// Of a row at `y`, cells from the grid's upper edge.
+    void goToRow(double y) {
+        const auto cy = static_cast<float>(y - 0.5);
+        const int whole = static_cast<int>(std::floor(cy));
+        ty_ = cy - static_cast<float>(whole);
+        rows_ = {std::clamp(whole, 0, labels_.height() - 1),
+                 std::clamp(whole + 1, 0, labels_.height() - 1)};
+        at_ = INT_MIN;
+    }
+    /// Between columns `whole` and whole + 1; they go on across the grid's edge. False where none
+    /// of the four shows the picture.
+    bool goTo(int whole) {
+        if (whole == at_) return some_;
+        at_ = whole;
+        const int width = labels_.width();
+        const int x = (whole % width + width) % width;
+        const std::array<int, 2> columns = {x, x + 1 < width ? x + 1 : 0};
+        some_ = false;
+        for (std::size_t c = 0; c < mine_.size(); ++c) {
+            mine_[c] = labels_.at(columns[c & 1], rows_[c >> 1]) == index_;
+            some_ = some_ || mine_[c];
+        }
+        for (std::size_t c = 0; c < corrections_.size() && some_; ++c) {
+            const int column = print_.column(columns[c & 1], width);
+            const int row = rows_[c >> 1] - print_.box.y;
+            const bool inside = column >= 0 && row >= 0 && row < print_.box.height;
+            corrections_[c] = inside ? &correction_.at(column, row) : nullptr;
+        }
+        return some_;
+    }
+    /// The share of what is shown that the picture has, `tx` of the way to the next column, and the
+    /// factor for its light there.
+    [[nodiscard]] std::pair<float, glm::vec3> at(float tx) const {
+        const std::array<float, 4> shares = {(1 - tx) * (1 - ty_), tx * (1 - ty_), (1 - tx) * ty_,
+                                             tx * ty_};
+        float weight = 0;
+        for (std::size_t c = 0; c < shares.size(); ++c)
+            if (mine_[c]) weight += shares[c];
+        glm::vec4 factor(0);
+        for (std::size_t c = 0; c < shares.size(); ++c)
+            if (corrections_[c]) factor += shares[c] * glm::vec4(*corrections_[c], 1);
+        return {weight, factor.a > 0 ? glm::vec3(factor) / factor.a : glm::vec3(1)};
+    }
+
+  private:
+    const Footprint& print_;
+    int index_;
+    const Image<int>& labels_;
+    const Image<glm::vec3>& correction_;
+    std::array<int, 2> rows_{};
+    float ty_ = 0;  ///< how far the row is to the second of these
+    int at_ = INT_MIN;
+    bool some_ = false;
+    std::array<bool, 4> mine_{};
+    std::array<const glm::vec3*, 4> corrections_{};
+};
+
 /// Adds one picture to rows [top, top + sums.height()) of the panorama: linear light, weighted.
 void draw(const Drawn& picture, const Footprint& print, int index, const Image<int>& labels,
           const glm::dvec3& gain, const Vignetting& vignetting, const Image<glm::vec3>& correction,
           int width, int top, Image<glm::vec4>& sums) {
     const int gridWidth = labels.width();
     const double cells = static_cast<double>(gridWidth) / width;
-    const int first = std::max(top, static_cast<int>((print.box.y - 2) / cells));
+    const GridBox& box = print.box;
+    const int first = std::max(top, static_cast<int>((box.y - kAroundDrawn) / cells));
     const int last = std::min(top + sums.height(),
-                              static_cast<int>((print.box.y + print.box.height + 2) / cells) + 1);
-    const bool all = print.box.width >= gridWidth;
-    const int left = all ? 0 : static_cast<int>(std::floor((print.box.x - 2) / cells));
-    const int right =
-        all ? width
-            : std::min(left + width,
-                       static_cast<int>(std::ceil((print.box.x + print.box.width + 2) / cells)));
+                              static_cast<int>((box.y + box.height + kAroundDrawn) / cells) + 1);
+    int left = 0, right = width;
+    if (box.width < gridWidth) {
+        left = static_cast<int>(std::floor((box.x - kAroundDrawn) / cells));
+        right = std::min(left + width,
+                         static_cast<int>(std::ceil((box.x + box.width + kAroundDrawn) / cells)));
+    }
     // Sine and cosine of each column's longitude.
     std::vector<glm::dvec2> turns;
     for (int x = left; x < right; ++x) {
@@ -164,61 +245,23 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
     const LinearTable& linear = linearTable();
     parallelForBlocks(first, last, 4, [&](std::int64_t begin, std::int64_t end) {
         RowPixels pixels(static_cast<std::size_t>(std::max(0, right - left)));
+        CellsAround around(print, index, labels, correction);
         for (auto y = static_cast<int>(begin); y < end; ++y) {
             const double latitude = M_PI * (0.5 - 2 * (y + 0.5) / width);
             pixels.count = 0;
-            const auto cy = static_cast<float>((y + 0.5) * cells - 0.5);
-            const int gy = static_cast<int>(std::floor(cy));
-            const float ty = cy - static_cast<float>(gy);
-            const int ys[2] = {std::clamp(gy, 0, labels.height() - 1),
-                               std::clamp(gy + 1, 0, labels.height() - 1)};
-            // Four cells around, the same for some pixels.
-            int cellAt = INT_MIN;
-            std::array<bool, 4> mine{};
-            std::array<const glm::vec3*, 4> corrections{};
-            bool some = false;
-            const auto goTo = [&](int whole) {
-                cellAt = whole;
-                int gx = whole;
-                while (gx < 0) gx += gridWidth;
-                while (gx >= gridWidth) gx -= gridWidth;
-                const std::array<int, 2> columns = {gx, gx + 1 < gridWidth ? gx + 1 : 0};
-                some = false;
-                for (std::size_t c = 0; c < 4; ++c) {
-                    mine[c] = labels.at(columns[c & 1], ys[c >> 1]) == index;
-                    some = some || mine[c];
-                }
-                for (std::size_t c = 0; c < 4 && some; ++c) {
-                    const int own = print.column(columns[c & 1], gridWidth);
-                    const int ownRow = ys[c >> 1] - print.box.y;
-                    corrections[c] = own >= 0 && ownRow >= 0 && ownRow < print.box.height
-                                         ? &correction.at(own, ownRow)
-                                         : nullptr;
-                }
-            };
+            around.goToRow((y + 0.5) * cells);
             for (int x = left; x < right; ++x) {
                 const double cx = (x + 0.5) * cells - 0.5;
                 int whole = static_cast<int>(cx);
                 whole -= cx < whole;
-                if (whole != cellAt) goTo(whole);
-                if (!some) {
+                if (!around.goTo(whole)) {
                     // The step to the next cell of the grid; rounding may make it one pixel late.
                     x = std::max(x, static_cast<int>(std::floor((whole + 1.5) / cells - 0.5)) - 1);
                     continue;
                 }
-                const auto tx = static_cast<float>(cx - whole);
-                const std::array<float, 4> shares = {(1 - tx) * (1 - ty), tx * (1 - ty),
-                                                     (1 - tx) * ty, tx * ty};
-                // The share that this picture has in the cells around.
-                float weight = 0;
-                for (std::size_t c = 0; c < 4; ++c)
-                    if (mine[c]) weight += shares[c];
-                if (weight <= 0) continue;
-                glm::vec4 factor(0);
-                for (std::size_t c = 0; c < 4; ++c)
-                    if (corrections[c]) factor += shares[c] * glm::vec4(*corrections[c], 1);
-                pixels.add(x, turns[static_cast<std::size_t>(x - left)], weight,
-                           factor.a > 0 ? glm::vec3(factor) / factor.a : glm::vec3(1));
+                const auto [weight, factor] = around.at(static_cast<float>(cx - whole));
+                if (weight > 0)
+                    pixels.add(x, turns[static_cast<std::size_t>(x - left)], weight, factor);
             }
             pixels.find(picture, std::sin(latitude), std::cos(latitude));
             const auto to = sums.row(y - top);
@@ -243,8 +286,8 @@ int naturalWidth(const PanoramaAlignment& alignment) {
     double focal = 0;
     for (const PanoramaCamera& camera : alignment.cameras)
         if (camera.used) focal = std::max(focal, camera.focal);
-    const double width = std::clamp(2 * M_PI * focal, 64.0, double{kMaxPanoramaWidth});
-    return static_cast<int>(width) / 4 * 4;
+    const double width = std::clamp(2 * M_PI * focal, kLeastWidth, double{kMaxPanoramaWidth});
+    return static_cast<int>(width) / kWidthStep * kWidthStep;
 }
 
 Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& alignment,
@@ -255,7 +298,7 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
                     "a panorama of {} pixels in width; an even number is expected", width);
     const int height = width / 2;
     const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-    STX_CHECK(job.limits.checkAllocation(pixels, 8, "the panorama"));
+    STX_CHECK(job.limits.checkAllocation(pixels, 2 * sizeof(glm::u8vec4), "the panorama"));
     const int gridWidth = gridWidthFor(alignment, width);
     STX_TRY(auto prints, footprintsOf(source, alignment, gridWidth, job));
     alignment.vignetting = findVignetting(prints, gridWidth);
@@ -267,16 +310,15 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
     const auto corrections = findCorrections(prints, gains, labels);
 
     PanoramaImage out{Rgba8Image(width, height)};
-    // Sums of a band of rows share a quarter of the memory.
     const auto rowBytes = static_cast<std::uint64_t>(width) * sizeof(glm::vec4);
     const int band = static_cast<int>(std::clamp<std::uint64_t>(
-        job.limits.maxMemoryBytes / 4 / rowBytes, 1, static_cast<std::uint64_t>(height)));
+        job.limits.maxMemoryBytes / kBandShare / rowBytes, 1, static_cast<std::uint64_t>(height)));
     // Rows that some picture reaches.
     const double cells = static_cast<double>(gridWidth) / width;
     int first = height, last = 0;
     for (const Footprint& f : prints) {
-        first = std::min(first, static_cast<int>((f.box.y - 3) / cells));
-        last = std::max(last, static_cast<int>((f.box.y + f.box.height + 3) / cells) + 1);
+        first = std::min(first, static_cast<int>((f.box.y - kAroundRows) / cells));
+        last = std::max(last, static_cast<int>((f.box.y + f.box.height + kAroundRows) / cells) + 1);
     }
     first = std::max(first, 0);
     last = std::min(last, height);
@@ -284,8 +326,9 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
     std::int64_t done = 0;
     for (int top = first; top < last; top += band) {
         Image<glm::vec4> sums(width, std::min(band, last - top), glm::vec4(0));
-        const double from = static_cast<double>(top) * gridWidth / width - 3;
-        const double to = static_cast<double>(top + sums.height()) * gridWidth / width + 3;
+        const double from = static_cast<double>(top) * gridWidth / width - kAroundRows;
+        const double to =
+            static_cast<double>(top + sums.height()) * gridWidth / width + kAroundRows;
         for (std::size_t k = 0; k < prints.size(); ++k) {
             STX_CHECK(job.checkCancelled());
             job.progress(++done, bands * static_cast<std::int64_t>(prints.size()), "drawing");
@@ -306,7 +349,7 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
             const auto toRow = out.pixels.row(top + static_cast<int>(y));
             for (std::size_t x = 0; x < toRow.size(); ++x) {
                 const glm::vec4 s = fromRow[x];
-                if (s.a <= 1e-3f) continue;
+                if (s.a <= kLeastCoverage) continue;
                 const glm::vec3 c = glm::vec3(s) / s.a;
                 toRow[x] = {tables.code(c.r), tables.code(c.g), tables.code(c.b),
                             static_cast<std::uint8_t>(std::min(1.0f, s.a) * 255.0f + 0.5f)};

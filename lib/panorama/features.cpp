@@ -6,13 +6,37 @@
 namespace stx::panorama {
 namespace {
 
+/// Corners are looked for in the work copy and in reductions of it by the square root of 2 and its
+/// powers.
 constexpr int kLevels = 4;
 constexpr int kMargin = 10;  ///< pixels of a level without corners
 constexpr int kCells = 8;    ///< parts along each side that share the corners
 /// Corners weaker than this are noise of a good picture: square codes of luma for a pixel (the
 /// harmonic mean of the structure tensor's eigenvalues).
 constexpr float kWeakest = 2;
-constexpr float kSpacing = 1.2f;  ///< pixels between the 16 x 16 samples of a descriptor
+/// Added to the trace that the strength of a corner is divided by: squared codes of luma for a
+/// pixel.
+constexpr float kFlatTrace = 1e-3f;
+/// Directions around a corner that are at least this share of the most frequent one's weight
+/// describe it, too; so many in all.
+constexpr float kAsFrequent = 0.8f;
+constexpr std::size_t kMostDirections = 2;
+
+// A descriptor: kDescriptorCells x kDescriptorCells cells, each of kCellSamples x kCellSamples
+// samples and with a share for each of kDirections directions.
+constexpr int kDescriptorCells = 4, kCellSamples = 4, kSamples = kDescriptorCells * kCellSamples;
+constexpr int kDirections = 8;
+/// Cells along each side with a margin of one, where what samples share beyond the edge goes.
+constexpr int kCellsAndMargin = kDescriptorCells + 2;
+/// Directions of a cell while shares are summed up: those that go beyond the last belong to the
+/// first two.
+constexpr int kSlots = kDirections + 2;
+constexpr float kSpacing = 1.2f;  ///< pixels between samples
+constexpr float kMiddleSample = 0.5f * (kSamples - 1);
+/// Square roots of shares become bytes by this factor; shares of 13 % and more are 255.
+constexpr float kCodeOfRoot = 700;
+/// Interpolation reads the pixel behind: positions end this far before the last one.
+constexpr float kBeforeLast = 1.001f;
 
 Image<float> floatOf(const Image<std::uint8_t>& grey) {
     Image<float> out(grey.width(), grey.height());
@@ -20,7 +44,7 @@ Image<float> floatOf(const Image<std::uint8_t>& grey) {
     return out;
 }
 
-/// 1 4 6 4 1 in both directions, into an image of the same size.
+/// Smoothed by 1 4 6 4 1 (sixteenths) in both directions, into an image of the same size.
 void blur(const Image<float>& image, Image<float>& out) {
     const int w = image.width(), h = image.height();
     const auto line = [&](int y) { return image.row(std::clamp(y, 0, h - 1)).data(); };
@@ -95,7 +119,7 @@ Image<float> cornerStrength(const Gradients& g) {
     }
     for (std::size_t i = 0; i < xx.count(); ++i) {
         const float a = xx.pixels()[i], b = xy.pixels()[i], c = yy.pixels()[i];
-        xx.pixels()[i] = (a * c - b * b) / (a + c + 1e-3f);
+        xx.pixels()[i] = (a * c - b * b) / (a + c + kFlatTrace);
     }
     return xx;
 }
@@ -152,7 +176,8 @@ struct Around {
     std::array<float, Count> x, y;
     std::array<float, Count> turn, length;
 
-    /// Directions are shares of a turn, 0..1, to 1e-5: arc tangents by a polynomial.
+    /// Directions are shares of a turn, 0..1, to 1e-5: arc tangents of 0..1 by an odd polynomial of
+    /// least maximum error, which vectors do at once, and the other octants from it.
     void measure() {
         for (std::size_t i = 0; i < Count; ++i) {
             const float ax = std::abs(x[i]), ay = std::abs(y[i]);
@@ -168,7 +193,7 @@ struct Around {
     }
 };
 
-/// exp(-x) of x = 0, step, 2 step...
+/// exp(-x) of x = 0, step, 2 step, ...
 template <std::size_t Count>
 std::array<float, Count> bell(float step) {
     std::array<float, Count> out;
@@ -178,9 +203,11 @@ std::array<float, Count> bell(float step) {
 
 /// The directions that gradients around a corner have most: the first, and others nearly as strong.
 std::vector<float> directionsOf(const Gradients& g, glm::vec2 pixel) {
+    // Bins of 10 degrees; pixels to each side.
     constexpr int kBins = 36, kReach = 8, kWidth = 2 * kReach + 1;
     static_assert(kReach + 2 <= kMargin);
-    static const auto weights = bell<65>(1.0f / 32);  // by the square of the distance
+    // By the square of the distance: a normal distribution with a deviation of half the reach.
+    static const auto weights = bell<kReach * kReach + 1>(2.0f / (kReach * kReach));
     std::array<float, kBins> bins{}, smooth{};
     // All samples are whole pixels apart, so they share their fractions between pixels.
     const int x0 = static_cast<int>(pixel.x - 0.5f), y0 = static_cast<int>(pixel.y - 0.5f);
@@ -227,17 +254,15 @@ std::vector<float> directionsOf(const Gradients& g, glm::vec2 pixel) {
     std::vector<float> directions;
     for (int i = 0; i < kBins; ++i) {
         const float before = at(bins, i - 1), here = at(bins, i), after = at(bins, i + 1);
-        if (here <= 0 || here < 0.8f * highest || here <= before || here < after) continue;
+        if (here <= 0 || here < kAsFrequent * highest || here <= before || here < after) continue;
         const float peak = static_cast<float>(i) + peakOf(before, here, after);
         directions.push_back(peak * 2 * static_cast<float>(M_PI) / kBins);
-        if (directions.size() == 2) break;
+        if (directions.size() == kMostDirections) break;
     }
     return directions;
 }
 
-constexpr int kSamples = 16;  ///< of a descriptor along each side
-
-/// How a sample is shared among the cells of a descriptor, 4 x 4 with a margin of one.
+/// How a sample is shared among the cells of a descriptor.
 struct Sharing {
     int cell = 0;                    ///< the upper left of four
     std::array<float, 4> weights{};  ///< of the four
@@ -249,15 +274,16 @@ std::array<Sharing, kSamples * kSamples> sharings() {
     for (int j = 0; j < kSamples; ++j)
         for (int i = 0; i < kSamples; ++i) {
             Sharing& s = out[static_cast<std::size_t>(j * kSamples + i)];
-            const float cx = (static_cast<float>(i) + 0.5f) / 4 - 0.5f;
-            const float cy = (static_cast<float>(j) + 0.5f) / 4 - 0.5f;
+            const float cx = (static_cast<float>(i) + 0.5f) / kCellSamples - 0.5f;
+            const float cy = (static_cast<float>(j) + 0.5f) / kCellSamples - 0.5f;
             const int x = static_cast<int>(std::floor(cx)), y = static_cast<int>(std::floor(cy));
             const float tx = cx - static_cast<float>(x), ty = cy - static_cast<float>(y);
-            s.cell = (y + 1) * 6 + x + 1;
+            s.cell = (y + 1) * kCellsAndMargin + x + 1;
             s.weights = {(1 - tx) * (1 - ty), tx * (1 - ty), (1 - tx) * ty, tx * ty};
-            // At 8 spacings from the middle exp(-1/2).
-            const int dx = 2 * i - 15, dy = 2 * j - 15;
-            s.bell = std::exp(-static_cast<float>(dx * dx + dy * dy) / 512);
+            // A normal distribution whose deviation is half of a side. In halves of a spacing, so
+            // that distances are whole.
+            const int dx = 2 * i - (kSamples - 1), dy = 2 * j - (kSamples - 1);
+            s.bell = std::exp(-static_cast<float>(dx * dx + dy * dy) / (2 * kSamples * kSamples));
         }
     return out;
 }
@@ -266,13 +292,14 @@ Descriptor describe(const Gradients& g, glm::vec2 pixel, float direction) {
     static const auto shared = sharings();
     const glm::vec2 right(std::cos(direction), std::sin(direction)), down(-right.y, right.x);
     Around<kSamples * kSamples> around;
-    const float lastX = static_cast<float>(g.x.width()) - 1.001f;
-    const float lastY = static_cast<float>(g.x.height()) - 1.001f;
+    const float lastX = static_cast<float>(g.x.width()) - kBeforeLast;
+    const float lastY = static_cast<float>(g.x.height()) - kBeforeLast;
     const auto stride = static_cast<std::size_t>(g.x.width());
     for (int j = 0; j < kSamples; ++j) {
-        const glm::vec2 row = pixel - 0.5f + (static_cast<float>(j) - 7.5f) * kSpacing * down;
+        const glm::vec2 row =
+            pixel - 0.5f + (static_cast<float>(j) - kMiddleSample) * kSpacing * down;
         for (int i = 0; i < kSamples; ++i) {
-            const glm::vec2 p = row + (static_cast<float>(i) - 7.5f) * kSpacing * right;
+            const glm::vec2 p = row + (static_cast<float>(i) - kMiddleSample) * kSpacing * right;
             const float px = std::clamp(p.x, 0.0f, lastX), py = std::clamp(p.y, 0.0f, lastY);
             const int x = static_cast<int>(px), y = static_cast<int>(py);
             const float tx = px - static_cast<float>(x), ty = py - static_cast<float>(y);
@@ -290,13 +317,11 @@ Descriptor describe(const Gradients& g, glm::vec2 pixel, float direction) {
         }
     }
     around.measure();
-    // Shared among the two nearest cells in x and y and the two nearest of eight directions; 8 is
-    // 0.
-    constexpr std::size_t kSlots = 10;
-    std::array<float, 6 * 6 * kSlots> slots{};
+    // Shared among the two nearest cells in x and y and the two nearest directions.
+    std::array<float, std::size_t{kCellsAndMargin} * kCellsAndMargin * kSlots> slots{};
     for (std::size_t k = 0; k < shared.size(); ++k) {
         const Sharing& s = shared[k];
-        const float weight = around.length[k] * s.bell, d = around.turn[k] * 8;
+        const float weight = around.length[k] * s.bell, d = around.turn[k] * kDirections;
         const int d0 = static_cast<int>(d);
         const float td = d - static_cast<float>(d0), first = weight * (1 - td),
                     second = weight * td;
@@ -307,28 +332,32 @@ Descriptor describe(const Gradients& g, glm::vec2 pixel, float direction) {
         };
         add(0, s.weights[0]);
         add(1, s.weights[1]);
-        add(6, s.weights[2]);
-        add(7, s.weights[3]);
+        add(kCellsAndMargin, s.weights[2]);
+        add(kCellsAndMargin + 1, s.weights[3]);
     }
-    std::array<float, 128> bins;
-    for (std::size_t cell = 0; cell < 16; ++cell) {
-        const float* from = slots.data() + ((cell / 4 + 1) * 6 + cell % 4 + 1) * kSlots;
-        for (std::size_t i = 0; i < 8; ++i) bins[cell * 8 + i] = from[i];
-        bins[cell * 8] += from[8];
-        bins[cell * 8 + 1] += from[9];
-    }
-    float sum = 1e-6f;
+    std::array<float, kDescriptorSize> bins;
+    static_assert(kDescriptorSize == kDescriptorCells * kDescriptorCells * kDirections);
+    float* to = bins.data();
+    for (std::size_t y = 1; y <= kDescriptorCells; ++y)
+        for (std::size_t x = 1; x <= kDescriptorCells; ++x, to += kDirections) {
+            const float* from = slots.data() + (y * kCellsAndMargin + x) * kSlots;
+            std::copy_n(from, kDirections, to);
+            to[0] += from[kDirections];
+            to[1] += from[kDirections + 1];
+        }
+    float sum = 1e-6f;  // never 0
     for (const float b : bins) sum += b;
     Descriptor out{};
     for (std::size_t i = 0; i < bins.size(); ++i)
-        out[i] = static_cast<std::uint8_t>(std::min(255.0f, 700 * std::sqrt(bins[i] / sum)));
+        out[i] =
+            static_cast<std::uint8_t>(std::min(255.0f, kCodeOfRoot * std::sqrt(bins[i] / sum)));
     return out;
 }
 
 }  // namespace
 
 Features findFeatures(const WorkCopy& copy, int most) {
-    // Finer levels get more corners: theirs are more, and more exact.
+    // Of all corners: finer levels have more of them, and more exact ones.
     constexpr std::array<double, kLevels> kShares = {0.45, 0.27, 0.18, 0.10};
     Features out;
     Image<float> even = floatOf(copy.grey);

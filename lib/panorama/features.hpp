@@ -8,10 +8,11 @@
 
 namespace stx::panorama {
 
+inline constexpr std::size_t kDescriptorSize = 128;  ///< bytes
 /// Gradients around a corner, turned with it: 4 x 4 cells of 8 directions, as in SIFT (Lowe 2004),
 /// square roots of shares (Arandjelovic, Zisserman 2012) as bytes. Aligned as caches are: they are
 /// compared in vectors, by the million.
-struct alignas(64) Descriptor : std::array<std::uint8_t, 128> {};
+struct alignas(64) Descriptor : std::array<std::uint8_t, kDescriptorSize> {};
 
 struct Feature {
     glm::vec2 pixel{0};  ///< of the work copy, (0.5, 0.5) is the first pixel's centre

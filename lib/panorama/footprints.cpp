@@ -12,6 +12,23 @@
 namespace stx::panorama {
 namespace {
 
+/// Footprint::inside of cells that a picture sees is at least this: 0 is not seen.
+constexpr double kLeastInside = 1e-4;
+/// A picture fills cells that are farther from its edge than this, in cells or as a share of its
+/// shorter side's half.
+constexpr double kFilledCells = 1.5, kFilledShare = 0.3;
+/// The smallest copy of a picture that its cells are taken from, pixels of its longer side.
+constexpr int kLeastCopy = 8;
+/// A picture that sees a pole, or nearly so, radians, has cells all around.
+constexpr double kAtPole = 1e-3;
+/// Cells that are added around what a picture sees.
+constexpr double kCellsAround = 2;
+/// Cells across a picture, and along the grid at least and at most.
+constexpr double kPictureCells = 160, kFewestCells = 256, kMostCells = 2048;
+/// Bytes of a cell beside its three colours (the picture's, coded, the correction): how far inside
+/// it is, its distance from the middle, its costs and labels.
+constexpr std::uint64_t kOtherBytes = 20;
+
 glm::dvec2 extentOf(glm::ivec2 size) {
     return glm::dvec2(size) / glm::length(glm::dvec2(size));
 }
@@ -40,7 +57,8 @@ Footprint footprintOf(Rgba8Image picture, const PanoramaCamera& camera, const Tu
     const glm::dvec2 extent = extentOf(camera.size);
     const WorkCopy copy = makeWorkCopy(
         std::move(picture),
-        std::max(8, static_cast<int>(std::lround(2 * cells * std::max(extent.x, extent.y)))));
+        std::max(kLeastCopy,
+                 static_cast<int>(std::lround(2 * cells * std::max(extent.x, extent.y)))));
     Image<glm::vec3> light(copy.colour.width(), copy.colour.height());
     const Srgb8Tables& tables = srgb8Tables();
     for (std::size_t i = 0; i < light.count(); ++i) {
@@ -76,8 +94,8 @@ Footprint footprintOf(Rgba8Image picture, const PanoramaCamera& camera, const Tu
             const glm::dvec2 inner = extent - p;
             const double border = std::min(inner.x, inner.y);
             if (border <= 0) continue;
-            f.inside.at(x, y) = static_cast<float>(std::max(1e-4, border / shorter));
-            f.whole.at(x, y) = border * cells > 1.5 || border > 0.3 * shorter;
+            f.inside.at(x, y) = static_cast<float>(std::max(kLeastInside, border / shorter));
+            f.whole.at(x, y) = border * cells > kFilledCells || border > kFilledShare * shorter;
             f.radius2.at(x, y) = static_cast<float>(glm::dot(p, p));
             f.colour.at(x, y) = linearAt(light, pixel);
         }
@@ -96,8 +114,8 @@ TurnLens lensOf(const PanoramaAlignment& alignment, const PanoramaCamera& camera
 GridBox boxOf(const PanoramaCamera& camera, const TurnLens& lens, int gridWidth) {
     const glm::dvec3 ahead = camera.worldFromCamera * glm::dvec3(0, 0, -1);
     const double latitude = std::asin(std::clamp(ahead.y, -1.0, 1.0));
-    const double radius =
-        std::acos(std::clamp(-lens.ray(extentOf(camera.size)).z, -1.0, 1.0)) + 4 * M_PI / gridWidth;
+    const double radius = std::acos(std::clamp(-lens.ray(extentOf(camera.size)).z, -1.0, 1.0)) +
+                          kCellsAround * 2 * M_PI / gridWidth;
     const int gridHeight = gridWidth / 2;
     const double perRadian = gridWidth / (2 * M_PI);
     GridBox box;
@@ -106,7 +124,7 @@ GridBox boxOf(const PanoramaCamera& camera, const TurnLens& lens, int gridWidth)
                           static_cast<int>(std::ceil((M_PI_2 - latitude + radius) * perRadian))) -
                  box.y;
     box.width = gridWidth;
-    if (std::abs(latitude) + radius < M_PI_2 - 1e-3) {
+    if (std::abs(latitude) + radius < M_PI_2 - kAtPole) {
         const double half = std::asin(std::sin(radius) / std::cos(latitude));
         const glm::dvec2 middle = PanoramaImage::position(ahead, gridWidth);
         box.x = static_cast<int>(std::floor(middle.x - half * perRadian));
@@ -124,8 +142,8 @@ int gridWidthFor(const PanoramaAlignment& alignment, int panoramaWidth) {
         angle += 2 * std::atan(std::max(camera.size.x, camera.size.y) / (2 * camera.focal));
         ++used;
     }
-    const double cells = 2 * M_PI * 160 / (angle / std::max(used, 1));
-    const int width = static_cast<int>(std::clamp(cells, 256.0, 2048.0)) / 2 * 2;
+    const double cells = 2 * M_PI * kPictureCells / (angle / std::max(used, 1));
+    const int width = static_cast<int>(std::clamp(cells, kFewestCells, kMostCells)) / 2 * 2;
     return std::min(width, panoramaWidth);
 }
 
@@ -141,7 +159,8 @@ Result<std::vector<Footprint>> footprintsOf(PictureSource& source,
         const GridBox box = boxOf(camera, lensOf(alignment, camera), gridWidth);
         cells += static_cast<std::uint64_t>(box.width) * static_cast<std::uint64_t>(box.height);
     }
-    STX_CHECK(job.limits.checkAllocation(cells, 3 * sizeof(glm::vec3) + 20, "finding seams"));
+    STX_CHECK(
+        job.limits.checkAllocation(cells, 3 * sizeof(glm::vec3) + kOtherBytes, "finding seams"));
     std::vector<Footprint> out(used.size());
     std::vector<Result<void>> made(used.size());
     std::atomic<std::int64_t> done = 0;

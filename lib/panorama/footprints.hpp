@@ -9,7 +9,7 @@
 namespace stx::panorama {
 
 /// A rectangle of an equirectangular grid around what a picture sees. Columns go on across the
-/// grid's edge: column x stands for x modulo the width.
+/// grid's edge: column x is column x modulo the grid's width.
 struct GridBox {
     int x = 0, y = 0, width = 0, height = 0;
 };
@@ -44,7 +44,8 @@ struct Footprint {
     }
 };
 
-/// Cells of a grid on which a picture is about 160 wide.
+/// Cells of a grid on which a picture of the series is about 160 wide, 256 to 2048, even and no
+/// more than the panorama has.
 [[nodiscard]] int gridWidthFor(const PanoramaAlignment& alignment, int panoramaWidth);
 
 /// Footprints of all used pictures. Errors: those of the source; cancelled.
@@ -66,10 +67,12 @@ void clearVignetting(std::vector<Footprint>& footprints, const Vignetting& vigne
 [[nodiscard]] std::vector<glm::dvec3> findGains(const std::vector<Footprint>& footprints,
                                                 int gridWidth);
 
-/// Linear light with a gain. What is clipped in the picture stays white when it is made darker.
+/// Linear light with a gain. What is clipped in the picture stays white when it is made darker:
+/// above kNearlyClipped of white gains below 1 lose their effect, and at white they have none.
+inline constexpr float kNearlyClipped = 0.7f;
 [[nodiscard]] inline glm::vec3 withGain(glm::vec3 light, glm::vec3 gain) {
     const float highest = std::max(light.r, std::max(light.g, light.b));
-    const float t = std::clamp((highest - 0.7f) / 0.3f, 0.0f, 1.0f);
+    const float t = std::clamp((highest - kNearlyClipped) / (1 - kNearlyClipped), 0.0f, 1.0f);
     return light * glm::mix(gain, glm::max(gain, glm::vec3(1)), t * t * (3 - 2 * t));
 }
 
@@ -85,8 +88,10 @@ void clearVignetting(std::vector<Footprint>& footprints, const Vignetting& vigne
 [[nodiscard]] inline glm::vec3 uncleared(glm::vec3 light, float clearing) {
     const float highest = std::max(light.r, std::max(light.g, light.b));
     if (!(highest > 0)) return light;
+    // Bisection: to a 65536th of white, below the finest codes.
+    constexpr int kHalvings = 16;
     float low = 0, high = 1;
-    for (int halving = 0; halving < 16; ++halving) {
+    for (int halving = 0; halving < kHalvings; ++halving) {
         const float middle = 0.5f * (low + high);
         (cleared(glm::vec3(middle), clearing).r < highest ? low : high) = middle;
     }

@@ -26,6 +26,10 @@ using DSums = hn::Repartition<std::uint64_t, DB>;
 using DNear = hn::CappedTag<std::int16_t, 32>;
 using DD = hn::CappedTag<double, 8>;
 
+/// What has a Z above this, of a ray of length 1, is taken to be behind the camera while rotations
+/// are tried: its position in the picture is far out, and no match is there.
+constexpr double kRoughlyBehind = -0.02;
+
 #if HWY_TARGET == HWY_SCALAR
 
 /// The sum of what each of four descriptors has in common with another, 16 bits each.
@@ -100,7 +104,7 @@ std::size_t countImpl(const RayMatches& m, const glm::dmat3& turn, double focal,
                       std::size_t most) {
     const DD d;
     const std::size_t lanes = hn::Lanes(d);
-    const auto behind = hn::Set(d, -0.02), length = hn::Set(d, focal),
+    const auto behind = hn::Set(d, kRoughlyBehind), length = hn::Set(d, focal),
                limit = hn::Set(d, tolerance * tolerance);
     std::array<hn::Vec<DD>, 9> t;
     for (std::size_t i = 0; i < 9; ++i)
@@ -121,7 +125,7 @@ std::size_t countImpl(const RayMatches& m, const glm::dmat3& turn, double focal,
     }
     for (; k < m.count && count + m.count - k > most; ++k) {
         const glm::dvec3 r = turn * glm::dvec3(m.ax[k], m.ay[k], m.az[k]);
-        if (r.z > -0.02) continue;
+        if (r.z > kRoughlyBehind) continue;
         const glm::dvec2 p = glm::dvec2(r) * (focal / -r.z) - glm::dvec2(m.bx[k], m.by[k]);
         if (glm::dot(p, p) < tolerance * tolerance) ++count;
     }
@@ -147,8 +151,8 @@ void positionsImpl(const RowOfRays& row, double* px, double* py) {
         const auto r2 = hn::Add(hn::Mul(u, u), hn::Mul(v, v));
         const auto bend = hn::Mul(hn::Set(d, row.lens.k1), r2);
         const auto seen =
-            hn::And(hn::Ge(depth, hn::Set(d, 1e-3)),
-                    hn::Gt(hn::Add(one, hn::Mul(hn::Set(d, 3.0), bend)), hn::Set(d, 0.05)));
+            hn::And(hn::Ge(depth, hn::Set(d, kBehind)),
+                    hn::Gt(hn::Add(one, hn::Mul(hn::Set(d, 3.0), bend)), hn::Set(d, kLeastSlope)));
         const auto scale = hn::Mul(hn::Set(d, row.lens.focal), hn::Add(one, bend));
         const auto x2 =
             hn::Mul(hn::Add(half, hn::Div(hn::Mul(scale, u), hn::Set(d, 2 * row.extent.x))),
@@ -184,6 +188,7 @@ void cubicImpl(const Image<glm::u8vec4>& picture, const double* x, const double*
     constexpr std::size_t kLanes = hn::MaxLanes(DF());
     const hn::Rebind<std::int32_t, DF> di;
     const hn::Rebind<std::uint8_t, DF> db;
+    // Catmull and Rom's kernel, at distances of up to 1 and from 1 to 2.
     const auto near = [](float t) { return (1.5f * t - 2.5f) * t * t + 1; };
     const auto far = [](float t) { return ((-0.5f * t + 2.5f) * t - 4) * t + 2; };
     const int w = picture.width(), h = picture.height();

@@ -15,6 +15,11 @@ namespace {
 
 /// Mosaics are no wider: the check would else take as long as all pictures by each of them.
 constexpr int kMostWidth = 4096;
+/// Pixels that the mosaic covers by at least this share are compared.
+constexpr float kCovered = 0.999f;
+/// The least sum of squared light that a gain is found from, and the least mean squared error
+/// (codes of 8 bits) that a PSNR is of: neither is divided by 0.
+constexpr double kNoLight = 1e-9, kLeastError = 1e-3;
 
 struct RowSums {
     glm::dvec3 product{0}, square{0};  ///< of linear light, for the gain
@@ -36,7 +41,7 @@ LeftOutPicture compared(const WorkCopy& copy, const PanoramaCamera& camera, cons
             glm::vec4& c = seen.at(x, y);
             const glm::dvec2 p = copy.position({x + 0.5, y + 0.5});
             c = mosaic.sample(worldFromCamera * lens.ray(p));
-            if (c.a < 0.999f) {
+            if (c.a < kCovered) {
                 c.a = 0;
                 continue;
             }
@@ -60,7 +65,7 @@ LeftOutPicture compared(const WorkCopy& copy, const PanoramaCamera& camera, cons
     LeftOutPicture out;
     out.covered = static_cast<double>(all.count) / static_cast<double>(seen.count());
     if (all.count == 0) return out;
-    const glm::vec3 gain(all.product / glm::max(all.square, glm::dvec3(1e-9)));
+    const glm::vec3 gain(all.product / glm::max(all.square, glm::dvec3(kNoLight)));
     double squares = 0;
     for (std::size_t i = 0; i < seen.count(); ++i) {
         const glm::vec4 c = seen.pixels()[i];
@@ -71,8 +76,9 @@ LeftOutPicture compared(const WorkCopy& copy, const PanoramaCamera& camera, cons
             squares += off * off;
         }
     }
-    out.psnr = 10 * std::log10(255.0 * 255.0 /
-                               std::max(1e-3, squares / (3.0 * static_cast<double>(all.count))));
+    out.psnr =
+        10 * std::log10(255.0 * 255.0 /
+                        std::max(kLeastError, squares / (3.0 * static_cast<double>(all.count))));
     return out;
 }
 

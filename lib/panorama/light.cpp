@@ -9,7 +9,24 @@
 namespace stx::panorama {
 namespace {
 
-/// The weighted mean of a square around each pixel, taken three times: that is nearly a Gaussian.
+/// So many means over squares, one after the other, are nearly a Gaussian.
+constexpr int kBoxes = 3;
+/// Added to linear light (0..1) before its logarithm is taken, so that differences in the dark,
+/// which are mostly noise, stay small.
+constexpr float kFloorOfLight = 0.01f;
+/// The weight of the mean of all blocks in each, beside those that are near: it shows only where
+/// none is.
+constexpr float kMeanOfAll = 1e-3f;
+/// Added to the share that a picture has of what is shown, so that each place has some picture.
+constexpr float kLeastShown = 1e-3f;
+/// Pictures that share fewer cells say nothing of their gains.
+constexpr std::size_t kFewestShared = 30;
+/// The weight of the assumption that a picture has no gain; pairs weigh the root of their cells.
+constexpr double kNoGain = 0.05;
+/// The largest gain that is believed, natural logarithm.
+constexpr double kMostGain = 3;
+
+/// The weighted mean of a square around each pixel, taken kBoxes times.
 /// `around`: rows end where they begin.
 void smooth(Image<glm::vec4>& image, int radius, bool around) {
     const int w = image.width(), h = image.height();
@@ -29,7 +46,7 @@ void smooth(Image<glm::vec4>& image, int radius, bool around) {
             sum -= glm::dvec4(line[static_cast<std::size_t>(i)]);
         }
     };
-    for (int pass = 0; pass < 3; ++pass) {
+    for (int pass = 0; pass < kBoxes; ++pass) {
         for (int y = 0; y < h; ++y)
             run(w, around, [&](int i) -> glm::vec4& { return image.at(i, y); });
         for (int x = 0; x < w; ++x)
@@ -37,14 +54,13 @@ void smooth(Image<glm::vec4>& image, int radius, bool around) {
     }
 }
 
-/// Logarithms of a picture's linear light after its gain. A floor keeps differences in the dark,
-/// which are mostly noise, small.
+/// Logarithms of a picture's linear light after its gain.
 Image<glm::vec3> logsOf(const Footprint& f, glm::vec3 gain) {
     Image<glm::vec3> out(f.box.width, f.box.height);
     for (std::size_t i = 0; i < out.count(); ++i)
         if (f.inside.pixels()[i] > 0)
-            out.pixels()[i] =
-                glm::log(withGain(cleared(f.colour.pixels()[i], f.clearingAt(i)), gain) + 0.01f);
+            out.pixels()[i] = glm::log(
+                withGain(cleared(f.colour.pixels()[i], f.clearingAt(i)), gain) + kFloorOfLight);
     return out;
 }
 
@@ -59,13 +75,13 @@ class SmoothBlocks {
     void add(glm::ivec2 cell, glm::vec3 value) {
         blocks_.at(cell.x / kBlock, cell.y / kBlock) += glm::vec4(value, 1);
     }
-    /// Means over a bell of `reach` blocks to either side, three times. Where nothing is near, the
-    /// mean of all.
+    /// Means over `reach` blocks to either side, kBoxes times. Where nothing is near, the mean of
+    /// all.
     void finish(int reach) {
         glm::vec4 all(0);
         for (const glm::vec4& block : blocks_.pixels()) all += block;
         if (all.a <= 0) return;
-        for (glm::vec4& block : blocks_.pixels()) block += all * (1e-3f / all.a);
+        for (glm::vec4& block : blocks_.pixels()) block += all * (kMeanOfAll / all.a);
         smooth(blocks_, reach, around_);
         for (glm::vec4& block : blocks_.pixels()) block /= block.a;
     }
@@ -97,7 +113,7 @@ SmoothBlocks lightDifference(const Footprint& a, const Image<glm::vec3>& logsA, 
                              const Image<glm::vec3>& logsB, int gridWidth) {
     // Natural logarithms of R, G and B: a larger difference is of another thing, not of the light.
     constexpr float kMost = 0.9f;
-    // Blocks to either side: with three passes a Gaussian of some 6 cells, a thirtieth of a
+    // Blocks to either side: with kBoxes passes nearly a Gaussian of some 6 cells, a thirtieth of a
     // picture. Wider ones leave steps where a lens darkens the edges of pictures.
     constexpr int kReach = 1;
     SmoothBlocks out(a.box, gridWidth);
@@ -112,7 +128,7 @@ SmoothBlocks lightDifference(const Footprint& a, const Image<glm::vec3>& logsA, 
 /// The weight of a picture in the mean light of each cell of its box: 1 where it is shown, falling
 /// to 0 over an eighth of a picture beyond its seams, and 0 where it ends.
 Image<float> weightsOf(const Footprint& f, int index, const Image<int>& labels) {
-    constexpr int kReach = 3;
+    constexpr int kReach = 3;  // blocks to either side
     const int gridWidth = labels.width();
     SmoothBlocks shown(f.box, gridWidth);
     for (int y = 0; y < f.box.height; ++y)
@@ -125,7 +141,7 @@ Image<float> weightsOf(const Footprint& f, int index, const Image<int>& labels) 
     for (int y = 0; y < f.box.height; ++y)
         for (int x = 0; x < f.box.width; ++x)
             if (const float inside = f.inside.at(x, y); inside > 0)
-                out.at(x, y) = inside * (shown.at({x, y}).x + 1e-3f);
+                out.at(x, y) = inside * (shown.at({x, y}).x + kLeastShown);
     return out;
 }
 
@@ -156,7 +172,8 @@ std::vector<glm::dvec3> findGains(const std::vector<Footprint>& prints, int grid
                         logs[static_cast<std::size_t>(c)].push_back(
                             std::log(ca[c] / cb[c] * clearing));
             });
-            if (std::min({logs[0].size(), logs[1].size(), logs[2].size()}) < 30) continue;
+            if (std::min({logs[0].size(), logs[1].size(), logs[2].size()}) < kFewestShared)
+                continue;
             Ratio ratio{a, b, {}, std::sqrt(static_cast<double>(logs[1].size()))};
             for (int c = 0; c < 3; ++c)
                 ratio.log[c] = medianOf(std::move(logs[static_cast<std::size_t>(c)]));
@@ -166,7 +183,7 @@ std::vector<glm::dvec3> findGains(const std::vector<Footprint>& prints, int grid
     std::vector<glm::dvec3> gains(n, glm::dvec3(1));
     for (int c = 0; c < 3; ++c) {
         std::vector<double> matrix(n * n, 0.0), right(n, 0.0);
-        for (std::size_t i = 0; i < n; ++i) matrix[i * n + i] += 0.05;  // no gain in the mean
+        for (std::size_t i = 0; i < n; ++i) matrix[i * n + i] += kNoGain;
         for (const auto& row : rows)
             for (const Ratio& r : row) {
                 matrix[r.a * n + r.a] += r.weight;
@@ -177,7 +194,8 @@ std::vector<glm::dvec3> findGains(const std::vector<Footprint>& prints, int grid
                 right[r.b] += r.weight * r.log[c];
             }
         if (!solveSymmetric(matrix, right)) continue;
-        for (std::size_t i = 0; i < n; ++i) gains[i][c] = std::exp(std::clamp(right[i], -3.0, 3.0));
+        for (std::size_t i = 0; i < n; ++i)
+            gains[i][c] = std::exp(std::clamp(right[i], -kMostGain, kMostGain));
     }
     return gains;
 }

@@ -13,13 +13,35 @@
 namespace stx::panorama {
 namespace {
 
-/// Matches that agree, fewer of which are taken for chance.
+/// Matches that agree with one rotation are taken for chance when they are fewer than this, or than
+/// so many and a share of all that were tried.
 constexpr std::size_t kFewest = 8;
+constexpr double kByChance = 5, kByChanceShare = 0.12;
 /// The nearest feature must be nearer than this share of the next one's distance.
 constexpr int kRatioPercent = 86;
 /// How far a match may be off the rotation, halves of the diagonal: the focal length is not exact
 /// yet, and the lens is taken for one without distortion.
 constexpr double kRoughTolerance = 0.009;
+/// Corners of one picture that are nearer to each other than this, pixels of the work copy, are
+/// one, found on two levels or with two directions.
+constexpr float kSameCorner = 4.0f;
+/// Matches are one where they are nearer to each other than this in both pictures, halves of the
+/// diagonal (1.5 and 3 pixels of a usual work copy).
+constexpr double kSameInA = 2e-3, kSameInB = 4e-3;
+/// Rotations are found by trying two matches at a time. Two right ones are among them with 99.99 %
+/// after -ln(1e-4) over the square of the share of right ones; so many times as many are tried,
+/// since matches are not exact, some more, and no more than a limit.
+constexpr double kLogOfSure = 9.2, kMoreTries = 4, kExtraTries = 20, kMostTries = 1500;
+/// The angle between two rays may differ by so many times the tolerance from that between their
+/// matches, and must itself be at least so many times the tolerance: else it says little.
+constexpr double kAngleTolerance = 1.5, kLeastAngle = 8;
+/// A rotation with fewer matches has none to be found better by.
+constexpr std::size_t kFewestOfTurn = 3;
+/// A rotation is fitted anew to the matches that agree with it, so often.
+constexpr int kRefits = 3;
+/// Steps of the fit of a rotation, at most, and the least step, radians: what doubles hold.
+constexpr int kTurnSteps = 8;
+constexpr double kTurnExact = 1e-12;
 
 std::vector<std::int16_t> sumsOf(const std::vector<Descriptor>& descriptors) {
     std::vector<std::int16_t> sums;
@@ -41,17 +63,18 @@ glm::dquat turnOfTwo(glm::dvec3 a1, glm::dvec3 a2, glm::dvec3 b1, glm::dvec3 b2)
 
 /// Matches of so many tried ones that must agree.
 double fewestOf(std::size_t tried) {
-    return std::max(static_cast<double>(kFewest), 5 + 0.12 * static_cast<double>(tried));
+    return std::max(static_cast<double>(kFewest),
+                    kByChance + kByChanceShare * static_cast<double>(tried));
 }
 
 bool enough(const Pair& pair, std::size_t tried) {
     return static_cast<double>(pair.matches.size()) >= fewestOf(tried);
 }
 
-/// Pairs of matches to try so that one of two right ones is among them when this share is right:
-/// 99.99 %, and four times as many since matches are not exact.
+/// How often two matches are tried when this share of all is right.
 int triesFor(double share) {
-    return static_cast<int>(std::min(1500.0, 4 * 9.2 / (share * share) + 20));
+    return static_cast<int>(
+        std::min(kMostTries, kMoreTries * kLogOfSure / (share * share) + kExtraTries));
 }
 
 }  // namespace
@@ -86,7 +109,7 @@ std::vector<Match> matchFeatures(const WorkCopy& copyA, const Features& a, const
                 // The same corner on another level, or turned, is not another corner.
                 const bool same =
                     mine.at >= 0 && glm::distance(b.points[static_cast<std::size_t>(mine.at)].pixel,
-                                                  b.points[j].pixel) < 4.0f;
+                                                  b.points[j].pixel) < kSameCorner;
                 if (d < mine.distance) {
                     if (!same) mine.next = mine.distance;
                     mine.distance = d;
@@ -101,16 +124,16 @@ std::vector<Match> matchFeatures(const WorkCopy& copyA, const Features& a, const
     for (std::size_t i = 0; i < best.size(); ++i) {
         const Best& m = best[i];
         if (m.at < 0 || nearestOfB[static_cast<std::size_t>(m.at)] != static_cast<int>(i)) continue;
-        // One that is alone has nothing to be mistaken for.
+        // Where b has no other feature, nothing can be mistaken for it.
         if (m.next < kFarDescriptors && m.distance * 100 > m.next * kRatioPercent) continue;
         matches.push_back({copyA.position(a.points[i].pixel),
                            copyB.position(b.points[static_cast<std::size_t>(m.at)].pixel)});
     }
-    // One for each place.
+    // One match for each place.
     std::vector<Match> single;
     for (const Match& m : matches) {
         const bool known = std::any_of(single.begin(), single.end(), [&](const Match& s) {
-            return glm::distance(s.a, m.a) < 2e-3 && glm::distance(s.b, m.b) < 4e-3;
+            return glm::distance(s.a, m.a) < kSameInA && glm::distance(s.b, m.b) < kSameInB;
         });
         if (!known) single.push_back(m);
     }
@@ -121,7 +144,7 @@ glm::dquat turnOf(const std::vector<Match>& matches, const TurnLens& lensA, cons
                   glm::dquat turn) {
     std::vector<std::pair<glm::dvec3, glm::dvec3>> rays;
     for (const Match& m : matches) rays.emplace_back(lensA.ray(m.a), lensB.ray(m.b));
-    for (int iteration = 0; iteration < 8; ++iteration) {
+    for (int iteration = 0; iteration < kTurnSteps; ++iteration) {
         // b = exp(w) turn a, to first order; least squares over the differences of the rays.
         std::vector<double> matrix(9, 0.0), right(3, 0.0);
         for (const auto& [a, b] : rays) {
@@ -137,7 +160,7 @@ glm::dquat turnOf(const std::vector<Match>& matches, const TurnLens& lensA, cons
         if (!solveSymmetric(matrix, right)) break;
         const glm::dvec3 step(right[0], right[1], right[2]);
         turn = glm::normalize(quatOf(step) * turn);
-        if (glm::length(step) < 1e-12) break;
+        if (glm::length(step) < kTurnExact) break;
     }
     return turn;
 }
@@ -165,8 +188,7 @@ Pair agreeingMatches(const std::vector<Match>& matches, const TurnLens& lens, do
     const RayMatches rays{column(0), column(1), column(2), column(3), column(4), matches.size()};
     std::mt19937 random(static_cast<std::uint32_t>(matches.size()));
     std::size_t most = 1;
-    // Angles on rays as far apart as the tolerance in the picture.
-    const double angle = 1.5 * tolerance / lens.focal;
+    const double angle = kAngleTolerance * tolerance / lens.focal;
     const auto all = static_cast<double>(matches.size());
     const auto count32 = static_cast<std::uint32_t>(matches.size());
     // What is too little to count needs not be found; a larger share, once found, needs fewer.
@@ -177,7 +199,7 @@ Pair agreeingMatches(const std::vector<Match>& matches, const TurnLens& lens, do
                             j = static_cast<std::uint32_t>(random()) % count32;
         if (i == j) continue;
         const double between = glm::distance(a[i], a[j]);
-        if (between < 8 * tolerance) continue;
+        if (between < kLeastAngle * tolerance) continue;
         if (std::abs(between - glm::distance(b[i], b[j])) > angle) continue;
         const glm::dquat turn = turnOfTwo(a[i], a[j], b[i], b[j]);
         const std::size_t count =
@@ -188,12 +210,12 @@ Pair agreeingMatches(const std::vector<Match>& matches, const TurnLens& lens, do
             tries = std::min(tries, triesFor(static_cast<double>(most) / all));
         }
     }
-    if (most < 3) return best;
-    for (int round = 0; round < 3; ++round) {
+    if (most < kFewestOfTurn) return best;
+    for (int round = 0; round < kRefits; ++round) {
         best.matches.clear();
         for (std::size_t i = 0; i < matches.size(); ++i)
             if (agrees(best.bFromA, i)) best.matches.push_back(matches[i]);
-        if (best.matches.size() < 3) break;
+        if (best.matches.size() < kFewestOfTurn) break;
         best.bFromA = turnOf(best.matches, lens, best.bFromA);
     }
     return best;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "lib/base/parallel.hpp"
@@ -10,6 +11,23 @@ namespace stx::panorama {
 namespace {
 
 const glm::dquat kNoTurn(1, 0, 0, 0);
+
+/// Another focal length is taken only where it makes the cost of focalByClosing() at most this
+/// share of what it was, and less by at least so much: a turn that closes says both clearly, and
+/// the rest is left to the adjustment.
+constexpr double kClearShare = 0.6, kClearGain = 0.3;
+/// Angles beyond this count as this in that cost, radians: mistakes all cost the same.
+constexpr double kMostOff = 1.0;
+/// The search for what is up: its first step and the least one, radians, and by how much a start's
+/// cost must be below that of the starts before it.
+constexpr double kFirstUpStep = 0.2, kLastUpStep = 2e-6, kLessCost = 1e-6;
+
+/// A direction across another one: of the X and Z axis one that is not nearly along it.
+glm::dvec3 anyAcross(glm::dvec3 direction) {
+    const bool alongX = std::abs(direction.x) >= 0.7;
+    return glm::normalize(
+        glm::cross(direction, alongX ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0)));
+}
 
 /// The relative turn that the matches of a pair say, to its second picture from its first.
 std::vector<glm::dquat> turnsOf(const std::vector<Pair>& pairs, const TurnLens& lens) {
@@ -130,23 +148,26 @@ double focalByClosing(const PictureTree& tree, const std::vector<Pair>& pairs, d
             if (tree.inTree[p] || !model.known[a]) continue;
             const double off = angleBetween(
                 turns[p], glm::inverse(model.worldFromCamera[b]) * model.worldFromCamera[a]);
-            cost += std::min(off, 1.0) * std::sqrt(static_cast<double>(pairs[p].matches.size()));
+            cost +=
+                std::min(off, kMostOff) * std::sqrt(static_cast<double>(pairs[p].matches.size()));
         }
         costs[static_cast<std::size_t>(i + kSteps)] = cost;
     });
     const auto least = std::min_element(costs.begin(), costs.end());
     const double start = costs[kSteps];
-    // Only what a turn that closes says is clear; the rest is left to the adjustment.
-    if (*least > 0.6 * start || start - *least < 0.3) return focal;
+    if (*least > kClearShare * start || start - *least < kClearGain) return focal;
     return focal * std::exp(kStep * static_cast<double>(least - costs.begin() - kSteps));
 }
 
 namespace {
 
-/// How unlikely a camera is held so: one of its sides is level, more or less, mostly its own; few
-/// look steeply up or down (else a camera that only rolled would have its axis for up).
-double heldSo(const glm::dmat3& frame, glm::dvec3 up) {
+/// How unlikely it is that a camera is held so, the negative logarithm of a probability but for a
+/// constant. Cameras are held upright or on their side, level within a degree or so, and few look
+/// steeply up or down (without that, a camera that only rolled would have its axis for up).
+double unlikelihood(const glm::dmat3& frame, glm::dvec3 up) {
+    // Usual angles, radians, by which a camera leans, and looks up or down.
     constexpr double kLean = M_PI / 180, kPitch = M_PI / 9;
+    // What looking straight up or down costs, a camera on its side, and one upside down.
     constexpr double kSteep = 5, kSideways = 1, kUpsideDown = 3;
     const double lean = std::abs(glm::dot(frame[0], up)), top = glm::dot(frame[1], up);
     // Tails as Cauchy's: some are held at any angle.
@@ -165,21 +186,20 @@ glm::dvec3 upOf(const TurnModel& model) {
         if (model.known[k]) frames.push_back(glm::mat3_cast(model.worldFromCamera[k]));
     const auto costOfUp = [&](glm::dvec3 up) {
         double cost = 0;
-        for (const auto& frame : frames) cost += heldSo(frame, up);
+        for (const auto& frame : frames) cost += unlikelihood(frame, up);
         return cost;
     };
     // From each camera's own top and sides, always downhill, in steps that shrink.
     constexpr std::size_t kMostStarts = 24;
-    double best = 1e300;
+    double best = std::numeric_limits<double>::max();
     glm::dvec3 bestUp(0, 1, 0);
     const std::size_t stride = (frames.size() + kMostStarts - 1) / kMostStarts;
     for (std::size_t k = 0; k < frames.size(); k += stride)
         for (const glm::dvec3 start : {frames[k][1], frames[k][0], -frames[k][0]}) {
             glm::dvec3 up = start;
             double cost = costOfUp(up);
-            for (double step = 0.2; step > 2e-6;) {
-                const glm::dvec3 across = glm::normalize(glm::cross(
-                    up, std::abs(up.x) < 0.7 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1)));
+            for (double step = kFirstUpStep; step > kLastUpStep;) {
+                const glm::dvec3 across = anyAcross(up);
                 const glm::dvec3 along = glm::cross(up, across);
                 bool better = false;
                 for (const glm::dvec3 d : {across, -across, along, -along}) {
@@ -193,7 +213,7 @@ glm::dvec3 upOf(const TurnModel& model) {
                 }
                 if (!better) step *= 0.5;
             }
-            if (cost < best - 1e-6) {
+            if (cost < best - kLessCost) {
                 best = cost;
                 bestUp = up;
             }
@@ -204,8 +224,7 @@ glm::dvec3 upOf(const TurnModel& model) {
 std::vector<int> pairsThatClose(const PictureTree& tree, const std::vector<Pair>& pairs,
                                 const TurnModel& model) {
     const glm::dvec3 up = upOf(model);
-    const glm::dvec3 zero = glm::normalize(
-        glm::cross(up, std::abs(up.x) < 0.7 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1)));
+    const glm::dvec3 zero = anyAcross(up);
     const auto forward = [&](int k) {
         return model.worldFromCamera[static_cast<std::size_t>(k)] * glm::dvec3(0, 0, -1);
     };
@@ -232,8 +251,7 @@ std::vector<int> pairsThatClose(const PictureTree& tree, const std::vector<Pair>
 }
 
 glm::dquat levelTurn(const TurnModel& model, glm::dvec3 up, bool closed) {
-    const glm::dvec3 zero = glm::normalize(
-        glm::cross(up, std::abs(up.x) < 0.7 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1)));
+    const glm::dvec3 zero = anyAcross(up);
     std::vector<double> yaws;
     for (std::size_t k = 0; k < model.known.size(); ++k)
         if (model.known[k])

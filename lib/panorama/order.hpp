@@ -6,36 +6,41 @@
 
 namespace stx::panorama {
 
-/// How pictures belong together: a tree of the best pairs.
+/// The pictures that belong together, joined by the pairs with the most matches (a maximum spanning
+/// tree).
 struct PictureTree {
-    std::vector<int> order;    ///< pictures of the largest connected part, parents first
-    std::vector<int> parent;   ///< of each picture; -1 = the root, or not in the part
-    std::vector<int> pair;     ///< index of the pair that links it to its parent
+    std::vector<int> order;   ///< the pictures in the tree, parents first
+    std::vector<int> parent;  ///< of each picture; -1 = it is the root, or not in the tree
+    std::vector<int> pair;  ///< of each picture, the index of the pair that joins it to its parent
     std::vector<bool> inTree;  ///< of each pair
 };
 
-/// The tree with the most matches of the largest connected part.
+/// The tree of the largest part of the pictures that pairs connect.
 [[nodiscard]] PictureTree treeOf(int pictures, const std::vector<Pair>& pairs);
 
-/// Rotations of the tree, one pair after the other; turns are those of the matches with this lens.
+/// The rotations of all pictures in the tree: each from that of its parent and the turn between the
+/// two, which their matches give with this lens.
 [[nodiscard]] TurnModel chain(const PictureTree& tree, const std::vector<Pair>& pairs,
                               const TurnLens& lens);
 
-/// The focal length with which pairs that are not in the tree fit best to the chain of those that
-/// are: a turn that closes tells it. `focal` when none can tell.
+/// The focal length (halves of the diagonal) with which the pairs outside of the tree agree best
+/// with the rotations that the tree gives: it is clear where pictures go once all around. `focal`
+/// where it is not clear.
 [[nodiscard]] double focalByClosing(const PictureTree& tree, const std::vector<Pair>& pairs,
                                     double focal);
 
-/// Axis that the pictures turn around, more or less: what is up, whatever the roll of each camera.
+/// What is up, a unit vector: the direction in which the pictures most likely have their upper edge
+/// or a side. Each camera may be rolled.
 [[nodiscard]] glm::dvec3 upOf(const TurnModel& model);
 
-/// Pairs that are not in the tree and with its path between their pictures go once all around.
+/// The pairs that close a full turn: they are not in the tree, and the way through it from one of
+/// their pictures to the other and back by the pair goes once all around. Indices of pairs.
 [[nodiscard]] std::vector<int> pairsThatClose(const PictureTree& tree,
                                               const std::vector<Pair>& pairs,
                                               const TurnModel& model);
 
-/// The world with `up` as +Y and the middle of what is seen along -Z; of a closed turn the first
-/// picture.
+/// The rotation into a world with `up` as +Y and, along -Z, the middle of what is seen; of a closed
+/// turn, which has no middle, what the first picture looks at.
 [[nodiscard]] glm::dquat levelTurn(const TurnModel& model, glm::dvec3 up, bool closed);
 
 }  // namespace stx::panorama

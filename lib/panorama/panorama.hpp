@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cmath>
-#include <string>
 #include <vector>
 
 #include <glm/gtc/quaternion.hpp>
@@ -106,7 +105,7 @@ struct ComposeSettings {
 };
 inline constexpr int kMaxPanoramaWidth = 8192;
 
-/// The width that ComposeSettings::width = 0 stands for.
+/// The width of a panorama where ComposeSettings::width is 0.
 [[nodiscard]] int naturalWidth(const PanoramaAlignment& alignment);
 
 /// Draws the panorama: gains in linear light and vignetting (put into the alignment), one picture

@@ -36,7 +36,9 @@ glm::vec4 PanoramaImage::sample(glm::dvec3 direction) const {
         }
     }
     const float alpha = std::clamp(sum.a, 0.0f, 1.0f);
-    if (sum.a <= 1e-4f) return glm::vec4(0);
+    // Cubic weights may be negative, and so may their sum beside what is covered.
+    constexpr float kNothing = 1e-4f;
+    if (sum.a <= kNothing) return glm::vec4(0);
     return glm::vec4(glm::clamp(glm::vec3(sum) / sum.a, 0.0f, 1.0f) * alpha, alpha);
 }
 

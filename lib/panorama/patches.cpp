@@ -7,9 +7,32 @@
 namespace stx::panorama {
 namespace {
 
+/// A patch: pixels of a level of the pyramid to each side of its middle, and along each side.
 constexpr int kRadius = 7;
 constexpr int kSide = 2 * kRadius + 1;
+/// A patch moves in so many steps at most, and is in its place after one that is shorter than this,
+/// pixels of the level; one that is longer than the most has lost its way.
 constexpr int kPatchSteps = 10;
+constexpr double kInPlace = 0.004, kMostStep = 4;
+/// Pixels from the middle of a patch within which all of it must be in the other picture: where the
+/// model stretches it more, the model is wrong.
+constexpr double kMostReach = 40;
+/// Standard deviations of luma (codes of 8 bits) below which a patch is flat: in the picture that
+/// it comes from, and in the other one.
+constexpr float kFlat = 1.5f, kFlatInOther = 1.0f;
+/// The smaller eigenvalue of a patch's structure tensor must be at least this share of the sum of
+/// both: an edge does not say where along it the patch is.
+constexpr float kLeastCorner = 0.02f;
+/// The correlation from which on a coarse level's move is believed.
+constexpr double kAlikeOnCoarse = 0.6;
+/// The coarsest level is passed over when the model is off by less than this, pixels of the work
+/// copy.
+constexpr double kNeedsCoarsest = 5;
+/// Patches around features nearer to each other than this, pixels, would be nearly the same.
+constexpr double kSamePlace = 3;
+/// The share of all places by which the order in which they are tried jumps on: the smaller part of
+/// the golden section, after which any number of them is spread over the picture.
+constexpr std::size_t kJumpPerMille = 382;
 
 /// 1 2 1 in both directions: what lies between pixels is then better known.
 Image<float> smoothed(const Image<float>& image) {
@@ -74,7 +97,7 @@ double moveOnLevel(const Image<float>& a, const Image<float>& b, double scale, P
     const double reach =
         (kRadius + 1) * (glm::length(move.toFromFrom[0]) + glm::length(move.toFromFrom[1])) + 2;
     const glm::dvec2 from = move.from * scale;
-    if (!(reach < 40) || !insideOf(a, from, kRadius + 2)) return 0;
+    if (!(reach < kMostReach) || !insideOf(a, from, kRadius + 2)) return 0;
     Window target;
     for (int y = 0; y < kSide; ++y)
         for (int x = 0; x < kSide; ++x)
@@ -82,7 +105,7 @@ double moveOnLevel(const Image<float>& a, const Image<float>& b, double scale, P
                 between(a, static_cast<float>(from.x) + static_cast<float>(x - kRadius),
                         static_cast<float>(from.y) + static_cast<float>(y - kRadius));
     target.measure();
-    if (target.deviation < 1.5f) return 0;
+    if (target.deviation < kFlat) return 0;
     glm::dvec2 to = move.to * scale;
     double correlation = 0;
     const glm::vec2 xx = move.xx * static_cast<float>(0.5 / scale),
@@ -110,7 +133,7 @@ double moveOnLevel(const Image<float>& a, const Image<float>& b, double scale, P
             for (int x = 0; x < kSide; ++x)
                 seen.values[static_cast<std::size_t>(y * kSide + x)] = at(x, y);
         seen.measure();
-        if (seen.deviation < 1.0f) return 0;
+        if (seen.deviation < kFlatInOther) return 0;
         const float gain = target.deviation / seen.deviation;
         float gxx = 0, gxy = 0, gyy = 0, ex = 0, ey = 0, product = 0;
         for (int y = 0; y < kSide; ++y) {
@@ -130,13 +153,12 @@ double moveOnLevel(const Image<float>& a, const Image<float>& b, double scale, P
         }
         correlation = product / (kSide * kSide * target.deviation * target.deviation);
         const float det = gxx * gyy - gxy * gxy;
-        // An edge does not say where along it the patch is.
         const float least = 0.5f * (gxx + gyy - std::hypot(gxx - gyy, 2 * gxy));
-        if (least < 0.02f * (gxx + gyy) || det <= 0) return 0;
+        if (least < kLeastCorner * (gxx + gyy) || det <= 0) return 0;
         const glm::dvec2 turn((gyy * ex - gxy * ey) / det, (gxx * ey - gxy * ex) / det);
-        if (glm::length(turn) > 4) return 0;
+        if (glm::length(turn) > kMostStep) return 0;
         to += move.toFromFrom * turn;
-        if (glm::length(turn) < 0.004) break;
+        if (glm::length(turn) < kInPlace) break;
     }
     move.to = to / scale;
     return correlation;
@@ -145,7 +167,7 @@ double moveOnLevel(const Image<float>& a, const Image<float>& b, double scale, P
 /// The place that the model expects, and how the surroundings are turned there.
 std::optional<PatchMove> expected(const WorkCopy& a, const WorkCopy& b, const TurnModel& model,
                                   int ia, int ib, glm::dvec2 pixel) {
-    constexpr double kStep = 6;
+    constexpr double kStep = 6;  // pixels; derivatives are by differences over them
     std::array<glm::dvec2, 9> seen;
     for (int i = 0; i < 9; ++i) {
         const glm::dvec2 p = pixel + kStep * glm::dvec2(i % 3 - 1, i / 3 - 1);
@@ -189,14 +211,14 @@ std::vector<Match> alignPatches(const std::vector<WorkCopy>& copies,
         for (const Feature& feature : features[f].points) {
             // A pixel's centre: the patch is then taken as it is.
             const glm::dvec2 pixel = glm::floor(glm::dvec2(feature.pixel)) + 0.5;
-            if (glm::distance(pixel, last) < 3) continue;
+            if (glm::distance(pixel, last) < kSamePlace) continue;
             last = pixel;
             const auto there = seenBy(model, from, to, copies[f].position(pixel));
             if (there && insideOf(pyramids[t][0], copies[t].pixel(*there), kRadius + 2))
                 places.push_back(pixel);
         }
-        // In an order that jumps over the picture, until there are enough.
-        std::size_t step = std::max<std::size_t>(1, places.size() * 382 / 1000);
+        // Until there are enough.
+        std::size_t step = std::max<std::size_t>(1, places.size() * kJumpPerMille / 1000);
         while (std::gcd(step, places.size()) > 1) ++step;
         const std::size_t enough = out.size() + static_cast<std::size_t>(s.most) / 2;
         for (std::size_t n = 0; n < places.size() && out.size() < enough; ++n) {
@@ -206,14 +228,14 @@ std::vector<Match> alignPatches(const std::vector<WorkCopy>& copies,
             PatchMove move = *place;
             double correlation = 1;
             for (int level = 2; level >= 0 && correlation > 0; --level) {
-                if (level == 2 && s.reach < 5) continue;
+                if (level == 2 && s.reach < kNeedsCoarsest) continue;
                 const double scale = std::ldexp(1.0, -level);
                 PatchMove tried = move;
                 correlation =
                     moveOnLevel(pyramids[f][static_cast<std::size_t>(level)],
                                 pyramids[t][static_cast<std::size_t>(level)], scale, tried);
                 // Coarse levels may see nothing where fine ones do.
-                if (correlation > 0.6) move = tried;
+                if (correlation > kAlikeOnCoarse) move = tried;
                 if (level > 0) correlation = 1;
             }
             if (correlation < s.alike || glm::distance(move.to, place->to) > s.reach) continue;

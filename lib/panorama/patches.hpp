@@ -12,7 +12,7 @@ using Pyramid = std::array<Image<float>, 3>;
 [[nodiscard]] Pyramid pyramidOf(const Image<std::uint8_t>& grey);
 
 struct PatchSettings {
-    int most = 120;       ///< patches of a pair
+    int most = 120;       ///< patches of a pair, half of them around features of either picture
     double reach = 6;     ///< pixels of the work copy that the model may be wrong by
     double alike = 0.88;  ///< correlation of two patches that show the same
 };

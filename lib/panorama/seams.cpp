@@ -19,8 +19,20 @@ constexpr float kSeamLength = 2;
 constexpr float kEndOfPicture = 60;
 /// Cost of showing a cell at a picture's edge; it falls to 0 towards the picture's middle.
 constexpr float kEdge = 1.5f;
-/// Cost of showing a cell whose light is clipped: another picture may have it.
-constexpr float kClipped = 4;
+/// Cost of showing a cell whose light is clipped, above this linear light: another picture may have
+/// it.
+constexpr float kClipped = 4, kClippedLight = 0.97f;
+/// Cost of showing a cell that a picture does not fill: more than any other.
+constexpr float kNotFilled = 1e6f;
+/// Of a mover that is seen at the very edge of a picture and so is cut off, this share of its cost
+/// counts; of one that is at 0.4 of the way to the middle and farther in, all.
+constexpr float kCutOff = 0.2f, kWholeByInside = 2;
+/// Of movers, cells so near to each other are one.
+constexpr int kSameMover = 2;
+/// The edge of what is seen goes on by so many cells, so that its pixels get a whole picture.
+constexpr int kExtended = 2;
+/// The least difference of colours before any was looked at: more than any.
+constexpr float kUnlike = 1e9f;
 /// A cell shows a mover where nothing within this many cells of another picture is like it, while
 /// all that the other one shows there is also in this one: leaves, waves and parallax are in both.
 constexpr int kMoverReach = 3;
@@ -30,6 +42,7 @@ constexpr float kMoverDifference = 25;
 constexpr float kWeakMover = 250;
 /// Cells around a mover that belong to it.
 constexpr int kMoverMargin = 2;
+/// How often each picture may take cells from the others.
 constexpr int kRounds = 2;
 
 /// Something that one picture shows and others do not.
@@ -61,7 +74,8 @@ class SeamGrid {
                 const float out = 1 - std::min(1.0f, f.inside.pixels()[p]);
                 cost_[k].pixels()[p] = kEdge * out * out;
                 const glm::vec3 raw = f.colour.pixels()[p];
-                if (std::max({raw.r, raw.g, raw.b}) > 0.97f) cost_[k].pixels()[p] += kClipped;
+                if (std::max({raw.r, raw.g, raw.b}) > kClippedLight)
+                    cost_[k].pixels()[p] += kClipped;
             }
         });
         labels_ = Image<int>(width_, height_, -1);
@@ -161,7 +175,7 @@ class SeamGrid {
                 const int m = c.x >= 0 ? nodeOf.at(c.x, c.y) : -1;
                 const float atP = change.at(cell.x, cell.y);
                 const float atQ = c.x >= 0 ? change.at(c.x, c.y) : kEndOfPicture;
-                // None is taken; p is.
+                // What the seam between both costs when neither is taken, and when only p is.
                 const float both = seamCost(old, other, p, q);
                 const float theirs =
                     other == own
@@ -172,7 +186,7 @@ class SeamGrid {
                     continue;
                 }
                 if (d.x < 0 || d.y < 0) continue;  // each two once
-                // q is.
+                // When only q is taken.
                 const float mine =
                     old < 0 ? kEndOfPicture
                             : kSeamLength + atP + (other == old ? atQ : difference(old, own, q));
@@ -193,9 +207,9 @@ class SeamGrid {
         return changed;
     }
 
-    /// The edge of what is seen goes on by two cells, so that its pixels get a whole picture.
+    /// Cells beside what is seen show what is shown there.
     void extend() {
-        for (int pass = 0; pass < 2; ++pass) {
+        for (int pass = 0; pass < kExtended; ++pass) {
             const Image<int> before = labels_;
             for (int y = 0; y < height_; ++y)
                 for (int x = 0; x < width_; ++x) {
@@ -253,14 +267,14 @@ class SeamGrid {
                         mover.cells.push_back(c);
                         mover.strength += cost;
                         inside += cost * prints_[k].inside.at(c.x, c.y);
-                        for (int dy = -2; dy <= 2; ++dy)
-                            for (int dx = -2; dx <= 2; ++dx)
+                        for (int dy = -kSameMover; dy <= kSameMover; ++dy)
+                            for (int dx = -kSameMover; dx <= kSameMover; ++dx)
                                 if (left.contains(c.x + dx, c.y + dy) &&
                                     left.at(c.x + dx, c.y + dy) > 0)
                                     open.emplace_back(c.x + dx, c.y + dy);
                     }
-                    // A mover in the middle of a picture is seen whole; one at its edge is cut off.
-                    mover.strength *= std::min(1.0f, 0.2f + 2 * inside / mover.strength);
+                    mover.strength *=
+                        std::min(1.0f, kCutOff + kWholeByInside * inside / mover.strength);
                     movers.push_back(std::move(mover));
                 }
         }
@@ -313,7 +327,7 @@ class SeamGrid {
         const glm::ivec2 own = cellOf(k, p), there = cellOf(other, p);
         const Footprint& f = prints_[other];
         const glm::vec3 colour = coded_[k].at(own.x, own.y);
-        float least = 1e9f;
+        float least = kUnlike;
         const auto look = [&](glm::ivec2 c) {
             if (f.inside.at(c.x, c.y) <= 0) return;
             const glm::vec3 d = colour - coded_[other].at(c.x, c.y);
@@ -330,11 +344,11 @@ class SeamGrid {
         return std::sqrt(least);
     }
     [[nodiscard]] float dataCost(int label, glm::ivec2 p) const {
-        if (label < 0) return 1e6f;
+        if (label < 0) return kNotFilled;
         const glm::ivec2 c = cellOf(static_cast<std::size_t>(label), p);
         const auto k = static_cast<std::size_t>(label);
         // Cells that a picture fills in part are shown only where no picture fills them.
-        if (c.x < 0 || !prints_[k].whole.at(c.x, c.y)) return 1e6f;
+        if (c.x < 0 || !prints_[k].whole.at(c.x, c.y)) return kNotFilled;
         return cost_[k].at(c.x, c.y);
     }
     [[nodiscard]] float seamCost(int a, int b, glm::ivec2 p, glm::ivec2 q) const {
@@ -352,6 +366,8 @@ class SeamGrid {
     }
     /// Each cell shows the picture whose middle it is nearest to.
     void startWithMiddles() {
+        // Cells that a picture fills wholly are shown before all that it fills in part (0..1).
+        constexpr float kWholeFirst = 10;
         Image<float> best(width_, height_, 0.0f);
         for (std::size_t k = 0; k < prints_.size(); ++k) {
             const Footprint& f = prints_[k];
@@ -359,7 +375,7 @@ class SeamGrid {
                 for (int x = 0; x < f.box.width; ++x) {
                     float inside = f.inside.at(x, y);
                     if (inside <= 0) continue;
-                    if (f.whole.at(x, y)) inside += 10;  // these first
+                    if (f.whole.at(x, y)) inside += kWholeFirst;
                     const glm::ivec2 p = wrapped({f.box.x + x, f.box.y + y});
                     if (inside <= best.at(p.x, p.y)) continue;
                     best.at(p.x, p.y) = inside;

@@ -17,14 +17,31 @@ struct LightRatio {
 
 enum class Half { both, upper, lower };
 
+/// What is off where there is no ratio: more than any.
+constexpr double kNoRatios = 1e9;
+
 struct VignettingFit {
-    glm::dvec2 law{0};  ///< of the square and of the fourth power
-    double off = 1e9;   ///< median of what is left of the ratios' differences
+    glm::dvec2 law{0};       ///< of the square and of the fourth power
+    double off = kNoRatios;  ///< median of what is left of the ratios' differences
 };
 
-/// How much less light there is near the corners (0.9 of the way), logarithm.
+/// The square of nine tenths of the way to the corners, where the loss of light is measured: at the
+/// corners themselves few pictures overlap.
+constexpr double kNearCorner2 = 0.9 * 0.9;
+
+/// Cauchy's scale is so many times the median of what is left, and at least this; logarithms.
+constexpr double kScaleOfMedian = 2, kLeastScale = 1e-3;
+/// Weights of the assumption that there is no vignetting, for each ratio, and so that the equations
+/// can be solved where there is none.
+constexpr double kNoneIsLikely = 1e-4, kSolvable = 1e-9;
+/// A law may make light so much brighter somewhere (logarithm), and is looked at in so many places
+/// between the middle and the corner.
+constexpr double kMostBrighter = 0.02;
+constexpr int kPlacesOfLaw = 10;
+
+/// How much less light there is near the corners, logarithm.
 double lossOf(glm::dvec2 law) {
-    return -(0.81 * law.x + 0.81 * 0.81 * law.y);
+    return -(kNearCorner2 * law.x + kNearCorner2 * kNearCorner2 * law.y);
 }
 
 std::vector<LightRatio> ratiosOf(const Footprint& a, const Footprint& b, int gridWidth) {
@@ -32,7 +49,7 @@ std::vector<LightRatio> ratiosOf(const Footprint& a, const Footprint& b, int gri
     const int top = std::max(a.box.y, b.box.y);
     const int bottom = std::min(a.box.y + a.box.height, b.box.y + b.box.height);
     shared(a, b, gridWidth, [&](glm::ivec2 pa, glm::ivec2 pb) {
-        if (pa.x % 2 != 0 || pa.y % 2 != 0) return;  // enough of them
+        if (pa.x % 2 != 0 || pa.y % 2 != 0) return;  // a quarter of the cells is enough
         const glm::vec3 ca = a.colour.at(pa.x, pa.y), cb = b.colour.at(pb.x, pb.y);
         LightRatio ratio;
         for (int c = 0; c < 3; ++c) {
@@ -70,7 +87,7 @@ VignettingFit fitVignetting(const std::vector<std::vector<LightRatio>>& pairs, H
         });
         std::vector<double> all;
         for (const auto& one : off) all.insert(all.end(), one.begin(), one.end());
-        fit.off = medianOf(std::move(all), 1e9);
+        fit.off = medianOf(std::move(all), kNoRatios);
     };
     measure();
     struct Sums {
@@ -78,7 +95,7 @@ VignettingFit fitVignetting(const std::vector<std::vector<LightRatio>>& pairs, H
         glm::dvec2 x{0};
     };
     for (int round = 0; round < kFitRounds && !flat; ++round) {
-        const double scale = std::max(2 * fit.off, 1e-3);
+        const double scale = std::max(kScaleOfMedian * fit.off, kLeastScale);
         std::vector<Sums> sums(pairs.size());
         parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
             const auto p = static_cast<std::size_t>(i);
@@ -97,13 +114,13 @@ VignettingFit fitVignetting(const std::vector<std::vector<LightRatio>>& pairs, H
                 s.by += w * r.powers.y * r.log;
             }
         });
-        // The gains' ratio of each pair is eliminated. Where pictures cannot tell, there is none.
-        double xx = 1e-9, xy = 0, yy = 1e-9, bx = 0, by = 0;
+        // The ratio of the gains of each pair is eliminated.
+        double xx = kSolvable, xy = 0, yy = kSolvable, bx = 0, by = 0;
         for (const Sums& s : sums) {
             if (s.w <= 0) continue;
-            xx += s.xx - s.x.x * s.x.x / s.w + 1e-4 * s.w;
+            xx += s.xx - s.x.x * s.x.x / s.w + kNoneIsLikely * s.w;
             xy += s.xy - s.x.x * s.x.y / s.w;
-            yy += s.yy - s.x.y * s.x.y / s.w + 1e-4 * s.w;
+            yy += s.yy - s.x.y * s.x.y / s.w + kNoneIsLikely * s.w;
             bx += s.bx - s.x.x * s.y / s.w;
             by += s.by - s.x.y * s.y / s.w;
         }
@@ -118,7 +135,9 @@ VignettingFit fitVignetting(const std::vector<std::vector<LightRatio>>& pairs, H
 }  // namespace
 
 Vignetting findVignetting(const std::vector<Footprint>& prints, int gridWidth) {
-    constexpr std::size_t kFewest = 400;  // cells
+    constexpr std::size_t kFewest = 400;  // cells that two pictures share
+    // Losses near the corners (logarithms) that are believed, and the share of what differs without
+    // the law that may be left with it.
     constexpr double kLeastLoss = 0.03, kMostLoss = 1.5, kBetter = 0.9;
     std::vector<std::pair<std::size_t, std::size_t>> both;
     for (std::size_t a = 0; a < prints.size(); ++a)
@@ -137,9 +156,9 @@ Vignetting findVignetting(const std::vector<Footprint>& prints, int gridWidth) {
     // Darker outwards, in all pictures alike, and so that it explains much of what differs.
     const double loss = lossOf(fit.law);
     if (loss < kLeastLoss || loss > kMostLoss || fit.off > kBetter * without.off) return {};
-    for (int step = 1; step <= 10; ++step) {
-        const double r2 = step / 10.0;
-        if (fit.law.x * r2 + fit.law.y * r2 * r2 > 0.02) return {};
+    for (int step = 1; step <= kPlacesOfLaw; ++step) {
+        const double r2 = static_cast<double>(step) / kPlacesOfLaw;
+        if (fit.law.x * r2 + fit.law.y * r2 * r2 > kMostBrighter) return {};
     }
     for (const Half half : {Half::upper, Half::lower}) {
         const double own = lossOf(fitVignetting(pairs, half, false).law);

@@ -11,18 +11,21 @@ namespace {
 
 /// Longer side of the copies: features and patches gain little from more.
 constexpr int kWorkSide = 1200, kLeastSide = 200;
-/// Of a pixel of a copy: colour, luma, and a pyramid of floats.
+/// Of a pixel of a copy: colour, luma, and a pyramid of floats (1 + 1/4 + 1/16 of its pixels).
 constexpr double kBytesPerWorkPixel = 4 + 1 + 4 * 1.3125;
+/// Copies take no more than this share of the memory.
+constexpr double kMemoryShare = 0.25;
+/// Height over width that the memory is counted with.
+constexpr double kUsualShape = 0.75;
 
 }  // namespace
 
 Result<std::vector<WorkCopy>> readWorkCopies(PictureSource& source, Job& job) {
     const int count = source.count();
-    // Copies share a quarter of the memory.
     const double pixels =
-        0.25 * static_cast<double>(job.limits.maxMemoryBytes) / kBytesPerWorkPixel / count;
-    const int side =
-        static_cast<int>(std::min<double>(kWorkSide, std::sqrt(std::max(0.0, pixels / 0.75))));
+        kMemoryShare * static_cast<double>(job.limits.maxMemoryBytes) / kBytesPerWorkPixel / count;
+    const int side = static_cast<int>(
+        std::min<double>(kWorkSide, std::sqrt(std::max(0.0, pixels / kUsualShape))));
     if (side < kLeastSide)
         return fail(ErrorCode::invalidInput,
                     "{} pictures need more memory than the limit of {} MiB; raise it with "

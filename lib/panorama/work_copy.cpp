@@ -60,12 +60,14 @@ WorkCopy makeWorkCopy(Rgba8Image picture, int maxSide) {
     copy.grey = Image<std::uint8_t>(copy.colour.width(), copy.colour.height());
     for (std::size_t i = 0; i < copy.grey.count(); ++i) {
         const glm::u8vec4 p = copy.colour.pixels()[i];
+        // Luma of ITU-R BT.601, in 256ths.
         copy.grey.pixels()[i] =
             static_cast<std::uint8_t>((77u * p.r + 150u * p.g + 29u * p.b + 128u) >> 8);
     }
     return copy;
 }
 
+// By 1 3 3 1 (eighths) in both directions.
 Image<float> halved(const Image<float>& image) {
     const int width = std::max(1, image.width() / 2), height = std::max(1, image.height() / 2);
     const auto clampX = [&](int x) { return std::clamp(x, 0, image.width() - 1); };

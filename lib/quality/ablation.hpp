@@ -41,7 +41,7 @@ struct AblationRow {
 
 /// Draws the pictures of all sets with all stages (the first row), without each step of refining
 /// that is done, at the import of a set, too, and without each stage of a mode.
-/// The fastest of `repeats` times is told. On the processor. Errors: those of rendering, cancelled.
+/// Times are the fastest of `repeats`. On the processor. Errors: those of rendering, cancelled.
 [[nodiscard]] Result<std::vector<AblationRow>> ablate(const std::vector<AblationSet>& sets,
                                                       const RenderSettings& settings, int repeats,
                                                       Job& job);

@@ -1,24 +1,7 @@
+#include "lib/base/printable.hpp"
 #include "lib/selection/selection.hpp"
 
 namespace stx {
-namespace {
-
-std::string escaped(const std::string& text) {
-    std::string out;
-    for (const char c : text) {
-        if (c == '<') {
-            out += "&lt;";
-        } else if (c == '&') {
-            out += "&amp;";
-        } else if (static_cast<unsigned char>(c) >= 0x20) {
-            out += c;
-        }
-    }
-    return out;
-}
-
-}  // namespace
-
 std::string selectionPlotSvg(const Selection& selection, const std::string& title) {
     constexpr int kWidth = 720, kHeight = 440, kLeft = 64, kTop = 48, kRight = 24, kBottom = 56;
     const int count = std::max<int>(1, static_cast<int>(selection.quality.size()));
@@ -34,7 +17,7 @@ std::string selectionPlotSvg(const Selection& selection, const std::string& titl
         "{1}\" "
         "font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" "
         "fill=\"#ffffff\"/>\n<text x=\"{2}\" y=\"28\" font-size=\"16\">{3}</text>\n",
-        kWidth, kHeight, kLeft, escaped(title));
+        kWidth, kHeight, kLeft, xmlText(title));
     for (int percent = 0; percent <= 100; percent += 20) {
         const double y = yOf(percent / 100.0);
         svg += fmt::format(

@@ -22,21 +22,6 @@ constexpr double kPlotHeader = 58;    ///< for the title
 constexpr double kPyramid = 0.11;     ///< length of a drawn pyramid, of the longest extent
 constexpr double kNumberOffset = 13;  ///< pixels from a viewpoint to the middle of its number
 
-std::string xmlText(const std::string& text) {
-    std::string out;
-    for (const char c : printable(text)) {
-        if (c == '<')
-            out += "&lt;";
-        else if (c == '>')
-            out += "&gt;";
-        else if (c == '&')
-            out += "&amp;";
-        else
-            out += c;
-    }
-    return out;
-}
-
 /// One of the two drawings: which axes of the upright space are across and down, and what they are
 /// called.
 struct PlotPanel {
@@ -101,6 +86,70 @@ class FreePlaces {
   private:
     std::vector<std::pair<glm::dvec2, glm::dvec2>> taken_;
 };
+
+/// Adds the pyramids of cameras, and their numbers where there is room; `at` gives places in the
+/// picture.
+template <class At>
+void addPyramids(const std::vector<PlottedCamera>& cameras, const std::vector<Pyramid>& pyramids,
+                 const At& at, std::string& out) {
+    auto to = std::back_inserter(out);
+    FreePlaces places;
+    std::string numbers;
+    for (std::size_t i = 0; i < pyramids.size(); ++i) {
+        const Pyramid& p = pyramids[i];
+        // Not to the map's pale end, which does not show on white.
+        const glm::u8vec3 c =
+            viridis(0.85 * static_cast<double>(i) /
+                    static_cast<double>(std::max<std::size_t>(pyramids.size() - 1, 1)));
+        const std::string colour = fmt::format("#{:02x}{:02x}{:02x}", c.r, c.g, c.b);
+        std::string lines, base;
+        for (std::size_t n = 0; n < 4; ++n) {
+            const glm::dvec2 from = at(p.nearCorners[n]), corner = at(p.farCorners[n]);
+            lines +=
+                fmt::format("M{:.1f} {:.1f}L{:.1f} {:.1f}", from.x, from.y, corner.x, corner.y);
+            base += fmt::format("{}{:.1f} {:.1f}", n ? "L" : "M", corner.x, corner.y);
+        }
+        const glm::dvec2 eye = at(p.eye);
+        fmt::format_to(to,
+                       "<g stroke=\"{0}\"><title>{1} {2}</title><path d=\"{3}\" fill=\"none\" "
+                       "stroke-width=\"0.8\"/><path d=\"{4}Z\" fill=\"{0}\" "
+                       "fill-opacity=\"0.2\" stroke-width=\"0.8\"/><circle cx=\"{5:.1f}\" "
+                       "cy=\"{6:.1f}\" r=\"2.5\" fill=\"{0}\"/></g>\n",
+                       colour, i, xmlText(cameras[i].name), lines, base, eye.x, eye.y);
+        // Behind the camera, where it does not look.
+        glm::dvec2 away = eye - at(p.middle);
+        away = glm::length(away) > 2 ? glm::normalize(away) : glm::dvec2(0.7, -0.7);
+        const std::string number = std::to_string(i);
+        const glm::dvec2 place = eye + kNumberOffset * away;
+        if (places.take(place, {7.0 * static_cast<double>(number.size()) + 2, 12}))
+            numbers += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", place.x,
+                                   place.y + 4, number);
+    }
+    fmt::format_to(to, "<g text-anchor=\"middle\" font-size=\"11\">\n{}</g>\n", numbers);
+}
+
+/// Adds the axes, in the lower left corner of a panel whose left edge and width these are, and the
+/// scale: pixels of a unit.
+void addAxes(const PlotPanel& panel, const glm::dquat& worldFromUpright, double left,
+             double panelWidth, double fullHeight, double scale, std::string& out) {
+    auto to = std::back_inserter(out);
+    const glm::dvec2 zero(left + 24, fullHeight - 20);
+    fmt::format_to(
+        to,
+        "<path d=\"M{0:.1f} {1:.1f}v-26M{0:.1f} {1:.1f}h26\" stroke=\"#333\" fill=\"none\"/>\n"
+        "<text x=\"{2:.1f}\" y=\"{3:.1f}\">{4}</text><text x=\"{5:.1f}\" y=\"{6:.1f}\" "
+        "text-anchor=\"middle\">{7}</text>\n",
+        zero.x, zero.y, zero.x + 30, zero.y + 4, axisName(worldFromUpright * panel.across), zero.x,
+        zero.y - 30, axisName(worldFromUpright * -panel.down));
+    const double length = roundLength(0.25 * (panelWidth - 2 * kPanelMargin) / scale);
+    const glm::dvec2 end(left + panelWidth - 18, fullHeight - 16);
+    fmt::format_to(to,
+                   "<path d=\"M{0:.1f} {1:.1f}h{2:.1f}m0 -4v8m{3:.1f} 0v-8\" stroke=\"#333\" "
+                   "fill=\"none\"/>\n<text x=\"{4:.1f}\" y=\"{5:.1f}\" "
+                   "text-anchor=\"middle\">{6:g}</text>\n</g>\n",
+                   end.x - length * scale, end.y, length * scale, -length * scale,
+                   end.x - 0.5 * length * scale, end.y - 7, length);
+}
 
 }  // namespace
 
@@ -175,56 +224,8 @@ std::string cameraPlot(const std::vector<PlottedCamera>& cameras, const Bounds& 
                            "fill=\"#ececef\" stroke=\"#888\"><title>the object</title></rect>\n",
                            corner.x, corner.y, size.x, size.y);
         }
-        FreePlaces places;
-        std::string numbers;
-        for (std::size_t i = 0; i < pyramids.size(); ++i) {
-            const Pyramid& p = pyramids[i];
-            // Not to the map's pale end, which does not show on white.
-            const glm::u8vec3 c =
-                viridis(0.85 * static_cast<double>(i) /
-                        static_cast<double>(std::max<std::size_t>(pyramids.size() - 1, 1)));
-            const std::string colour = fmt::format("#{:02x}{:02x}{:02x}", c.r, c.g, c.b);
-            std::string lines, base;
-            for (std::size_t n = 0; n < 4; ++n) {
-                const glm::dvec2 from = at(p.nearCorners[n]), corner = at(p.farCorners[n]);
-                lines +=
-                    fmt::format("M{:.1f} {:.1f}L{:.1f} {:.1f}", from.x, from.y, corner.x, corner.y);
-                base += fmt::format("{}{:.1f} {:.1f}", n ? "L" : "M", corner.x, corner.y);
-            }
-            const glm::dvec2 eye = at(p.eye);
-            fmt::format_to(to,
-                           "<g stroke=\"{0}\"><title>{1} {2}</title><path d=\"{3}\" fill=\"none\" "
-                           "stroke-width=\"0.8\"/><path d=\"{4}Z\" fill=\"{0}\" "
-                           "fill-opacity=\"0.2\" stroke-width=\"0.8\"/><circle cx=\"{5:.1f}\" "
-                           "cy=\"{6:.1f}\" r=\"2.5\" fill=\"{0}\"/></g>\n",
-                           colour, i, xmlText(cameras[i].name), lines, base, eye.x, eye.y);
-            // Behind the camera, where it does not look.
-            glm::dvec2 away = eye - at(p.middle);
-            away = glm::length(away) > 2 ? glm::normalize(away) : glm::dvec2(0.7, -0.7);
-            const std::string number = std::to_string(i);
-            const glm::dvec2 place = eye + kNumberOffset * away;
-            if (places.take(place, {7.0 * static_cast<double>(number.size()) + 2, 12}))
-                numbers += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", place.x,
-                                       place.y + 4, number);
-        }
-        fmt::format_to(to, "<g text-anchor=\"middle\" font-size=\"11\">\n{}</g>\n", numbers);
-        // The axes, in the lower left corner.
-        const glm::dvec2 zero(left + 24, fullHeight - 20);
-        fmt::format_to(
-            to,
-            "<path d=\"M{0:.1f} {1:.1f}v-26M{0:.1f} {1:.1f}h26\" stroke=\"#333\" fill=\"none\"/>\n"
-            "<text x=\"{2:.1f}\" y=\"{3:.1f}\">{4}</text><text x=\"{5:.1f}\" y=\"{6:.1f}\" "
-            "text-anchor=\"middle\">{7}</text>\n",
-            zero.x, zero.y, zero.x + 30, zero.y + 4, axisName(worldFromUpright * panel.across),
-            zero.x, zero.y - 30, axisName(worldFromUpright * -panel.down));
-        const double length = roundLength(0.25 * width / scale);
-        const glm::dvec2 end(left + panelWidth - 18, fullHeight - 16);
-        fmt::format_to(to,
-                       "<path d=\"M{0:.1f} {1:.1f}h{2:.1f}m0 -4v8m{3:.1f} 0v-8\" stroke=\"#333\" "
-                       "fill=\"none\"/>\n<text x=\"{4:.1f}\" y=\"{5:.1f}\" "
-                       "text-anchor=\"middle\">{6:g}</text>\n</g>\n",
-                       end.x - length * scale, end.y, length * scale, -length * scale,
-                       end.x - 0.5 * length * scale, end.y - 7, length);
+        addPyramids(cameras, pyramids, at, out);
+        addAxes(panel, worldFromUpright, left, panelWidth, fullHeight, scale, out);
     }
     return out + "</svg>\n";
 }

@@ -1,7 +1,6 @@
 #include "lib/splats/draw.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <cmath>
 #include <numeric>

@@ -181,7 +181,8 @@ double creaseSlope(const Line& l, double noise, double without) {
         return bendBefore < bendAfter ? 1.5 * l.w[2] - 2 * l.w[1] + 0.5 * l.w[0]
                                       : -1.5 * l.w[2] + 2 * l.w[3] - 0.5 * l.w[4];
     }
-    // A one-sided slope lags half a pixel behind a curved surface; the next difference mends that.
+    // A one-sided slope lags half a pixel behind a curved surface; the next difference corrects
+    // that.
     if (twoBefore) return 1.5 * l.w[2] - 2 * l.w[1] + 0.5 * l.w[0];
     if (twoAfter) return -1.5 * l.w[2] + 2 * l.w[3] - 0.5 * l.w[4];
     return paperSlope(l, without);

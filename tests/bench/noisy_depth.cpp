@@ -1,6 +1,6 @@
 // Gives the depth of a bundle the faults of sensors and stereo, or its colours those of cameras,
 // see tests/noisy_depth.hpp:
-//   noisy_depth BUNDLE OUT.exr noisePERCENT|codes8|missing3|edges1|light
+//   noisy_depth BUNDLE OUT.exr noisePERCENT|codes8|missing3|edges1|mixedPERCENT|light
 
 #include "tests/noisy_depth.hpp"
 
@@ -17,7 +17,8 @@ int main(int argc, char** argv) {
         STX_TRY(Bundle bundle, openBundle(argv[1], {}, job));
         if (!noisy::damage(bundle, argv[3]))
             return fail(ErrorCode::usage,
-                        "'{}' is not noise and a percentage, codes8, missing3, edges1 or light",
+                        "'{}' is not noise or mixed and a percentage, codes8, missing3, edges1 or "
+                        "light",
                         argv[3]);
         return writeExrBundle(bundle, argv[2], job);
     };

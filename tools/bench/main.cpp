@@ -1,5 +1,5 @@
-// stx-bench: the benchmark alone, for machines that have no image or mesh library. The same as
-// `stx bench`.
+// stx-bench: the tables of `stx bench` for people, and a check of GPUs, for machines that have no
+// image or mesh library.
 #include <cstdio>
 
 #include <CLI/CLI.hpp>
@@ -16,29 +16,15 @@ int report(const stx::Error& error) {
     return static_cast<int>(error.code);
 }
 
-bool writeWhole(const std::string& path, const std::string& text) {
-    const std::string temporary = path + ".part";
-    std::FILE* file = std::fopen(temporary.c_str(), "wb");
-    if (!file) return false;
-    bool ok = std::fwrite(text.data(), 1, text.size(), file) == text.size();
-    ok = std::fclose(file) == 0 && ok;
-    ok = ok && std::rename(temporary.c_str(), path.c_str()) == 0;
-    if (!ok) std::remove(temporary.c_str());
-    return ok;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
     CLI::App app{"Measures Lee & Park's two tables on this machine.", "stx-bench"};
     stx::BenchSettings settings;
-    std::string format = "text", svg;
     int table = 0, threads = 0;
     std::string splat = "data";
     bool devices = false, check = false;
     app.set_version_flag("--version", STX_VERSION);
-    app.add_option("--format", format, "text (default) or json")
-        ->check(CLI::IsMember({"text", "json"}));
     app.add_option("--table", table, "1 or 2; both by default")->check(CLI::Range(1, 2));
     app.add_option("--path", settings.paths,
                    "only these: shader, gl, software, compute, points, surface, "
@@ -51,7 +37,6 @@ int main(int argc, char** argv) {
     app.add_option("--device", settings.device, "one of --list-devices; the best by default")
         ->check(CLI::Range(0, 1023));
     app.add_option("--threads", threads, "0 = all processors")->check(CLI::Range(0, 4096));
-    app.add_option("--svg", svg, "writes a plot there, too");
     app.add_flag("--check", check,
                  "draws by every mode and pipeline on every GPU and compares with the processor's "
                  "pictures; 7 when one is unlike it");
@@ -93,8 +78,6 @@ int main(int argc, char** argv) {
     const auto result = stx::runBench(settings, job);
     for (const auto& note : job.takeNotes()) fmt::print(stderr, "stx-bench: {}\n", note);
     if (!result) return report(result.error());
-    if (!svg.empty() && !writeWhole(svg, stx::benchSvg(*result)))
-        return report({stx::ErrorCode::io, fmt::format("cannot write '{}'", svg), {}});
-    fmt::print("{}", format == "json" ? stx::benchJson(*result) : stx::benchText(*result));
+    fmt::print("{}", stx::benchText(*result));
     return 0;
 }

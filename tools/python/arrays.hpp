@@ -1,8 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <span>
-#include <string>
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>

@@ -11,7 +11,6 @@
 
 #include <algorithm>
 #include <map>
-#include <new>
 
 #include "formats/decoders/decoder_module.hpp"
 #include "formats/decoders/given_file.hpp"

@@ -171,143 +171,184 @@ Result<void> applyMorph(GltfFile& model, const Json& primitive, const std::strin
     return {};
 }
 
+/// Reads one primitive, part by part.
+class PrimitiveReader {
+  public:
+    PrimitiveReader(GltfFile& model, MeshBuilder& builder, Materials& materials,
+                    const Json& primitive, const std::string& where,
+                    std::map<std::string, int>& dropped)
+        : model_(model),
+          builder_(builder),
+          materials_(materials),
+          primitive_(primitive),
+          where_(where),
+          dropped_(dropped),
+          attributes_(model, builder, primitive, where) {}
+
+    Result<Primitive> read(const std::vector<double>& morphWeights) {
+        part().where = where_;
+        STX_TRY(const auto mode, getUint(primitive_, "mode", where_));
+        mode_ = mode.value_or(4);
+        if (mode_ > 6)
+            return fail(ErrorCode::invalidInput, "{}.mode is {}, expected 0 to 6", where_, mode_);
+        if (mode_ >= 1 && mode_ <= 3) return notDrawn("line primitives");
+        STX_CHECK(attributes_.open());
+        STX_TRY(const auto position, attributes_.get("POSITION", {"VEC3"}));
+        if (!position) return notDrawn("primitives without positions");
+        count_ = position->count;
+        STX_CHECK(readPositions(position));
+        STX_CHECK(readOthers());
+        STX_CHECK(readMaterial());
+        STX_CHECK(readInfluences());
+        STX_CHECK(applyMorph(model_, primitive_, where_, morphWeights, part()));
+        part().points = mode_ == 0;
+        if (mode_ != 0) STX_CHECK(readTriangles());
+        return std::move(result_);
+    }
+
+  private:
+    MeshPart& part() { return result_.part; }
+    Primitive notDrawn(const char* what) {
+        ++dropped_[what];
+        result_.drawn = false;
+        return std::move(result_);
+    }
+
+    Result<void> readPositions(const std::optional<AccessorValues>& position) {
+        STX_CHECK(checkCount(position, count_, 3, where_, "POSITION"));
+        part().positions = vectors<glm::dvec3>(*position);
+        // Points that are nowhere are left out later; a triangle needs all of its corners.
+        for (std::size_t i = 0; mode_ != 0 && i < count_; ++i) {
+            const auto p = part().positions[i];
+            if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+                return fail(ErrorCode::invalidInput,
+                            "{}: vertex {} is at ({}, {}, {}); positions must be finite numbers",
+                            attributes_.source("POSITION"), i, p.x, p.y, p.z);
+        }
+        return {};
+    }
+
+    /// Normals, tangents and colours.
+    Result<void> readOthers() {
+        STX_TRY(const auto normal, attributes_.get("NORMAL", {"VEC3"}));
+        STX_CHECK(checkCount(normal, count_, 3, where_, "NORMAL"));
+        if (normal) part().normals = vectors<glm::vec3>(*normal);
+        STX_TRY(const auto tangent, attributes_.get("TANGENT", {"VEC4"}));
+        STX_CHECK(checkCount(tangent, count_, 4, where_, "TANGENT"));
+        if (tangent) part().tangents = vectors<glm::vec4>(*tangent);
+        STX_TRY(const auto colour, attributes_.get("COLOR_0", {"VEC3", "VEC4"}));
+        STX_CHECK(checkCount(colour, count_, 3, where_, "COLOR_0"));
+        if (colour) part().colours = vectors<glm::vec4>(*colour);
+        if (colour && colour->components == 3)
+            for (auto& c : part().colours) c.a = 1.0f;
+        if (attributes_.has("COLOR_1")) ++dropped_["further vertex colours"];
+        return {};
+    }
+
+    Result<std::vector<glm::vec2>> readUvs(const UvSource& source) {
+        const auto name = fmt::format("TEXCOORD_{}", source.set);
+        STX_TRY(const auto values, attributes_.get(name, {"VEC2"}));
+        STX_CHECK(checkCount(values, count_, 2, where_, name));
+        std::vector<glm::vec2> uvs;
+        if (!values) return uvs;
+        uvs = vectors<glm::vec2>(*values);
+        for (auto& uv : uvs) uv = source.apply(uv);
+        return uvs;
+    }
+
+    /// The material, and the texture coordinates of its maps.
+    Result<void> readMaterial() {
+        STX_TRY(const auto index, getUint(primitive_, "material", where_));
+        STX_TRY(auto material, materials_.use(index, where_));
+        STX_TRY(part().uvs, readUvs(material.baseColour));
+        // Without a base colour's map, uvs serve the normal map alone.
+        if (material.normal.used && !material.baseColour.used) {
+            STX_TRY(part().uvs, readUvs(material.normal));
+        } else if (material.normal.used && !(material.normal == material.baseColour)) {
+            STX_TRY(part().normalUvs, readUvs(material.normal));
+        }
+        TexturesKept kept;
+        kept.baseColour = !material.baseColour.used || !part().uvs.empty();
+        kept.normal = !material.normal.used || !(part().normalUvs.empty() && part().uvs.empty()) ||
+                      count_ == 0;
+        // Whether a map has coordinates: its own, which are read here, or the base colour's.
+        const auto readOwn = [&](const UvSource& source,
+                                 std::vector<glm::vec2>& own) -> Result<bool> {
+            if (!source.used || source == material.baseColour) return kept.baseColour;
+            STX_TRY(own, readUvs(source));
+            return !own.empty();
+        };
+        STX_TRY(kept.metallicRoughness,
+                readOwn(material.metallicRoughness, part().metallicRoughnessUvs));
+        STX_TRY(kept.emissive, readOwn(material.emissive, part().emissiveUvs));
+        if (kept != TexturesKept()) {
+            model_.job().note(
+                fmt::format("{} has a textured material but no texture coordinates for it; the "
+                            "plain colour is used",
+                            where_));
+            material = materials_.withoutTextures(material, kept);
+        }
+        part().material = material.index;
+        return {};
+    }
+
+    /// The bones that move it.
+    Result<void> readInfluences() {
+        for (int set = 0; set < 4; ++set) {
+            STX_TRY(auto joints, attributes_.get(fmt::format("JOINTS_{}", set), {"VEC4"}));
+            STX_TRY(auto weights, attributes_.get(fmt::format("WEIGHTS_{}", set), {"VEC4"}));
+            if (!joints || !weights) break;
+            STX_CHECK(checkCount(joints, count_, 4, where_, "JOINTS"));
+            STX_CHECK(checkCount(weights, count_, 4, where_, "WEIGHTS"));
+            result_.influences.push_back({std::move(*joints), std::move(*weights)});
+        }
+        return {};
+    }
+
+    Result<void> readTriangles() {
+        if (attributes_.draco()) {
+            part().triangles = attributes_.draco()->triangles();
+            return {};
+        }
+        STX_TRY(const auto accessor, getUint(primitive_, "indices", where_));
+        if (!accessor) {
+            STX_CHECK(builder_.charge(count_, sizeof(glm::uvec3), where_));
+            part().triangles = assemble(
+                mode_, count_, [](std::size_t i) { return static_cast<std::uint32_t>(i); });
+            return {};
+        }
+        STX_TRY(const auto indices, model_.indices(*accessor, where_ + " indices"));
+        for (std::size_t i = 0; i < indices.size(); ++i)
+            if (indices[i] >= count_)
+                return fail(ErrorCode::invalidInput,
+                            "accessors[{}] ({} indices): index {} is vertex {}, but there are "
+                            "only {} vertices",
+                            *accessor, where_, i, indices[i], count_);
+        STX_CHECK(builder_.charge(indices.size(), sizeof(glm::uvec3), where_));
+        part().triangles =
+            assemble(mode_, indices.size(), [&](std::size_t i) { return indices[i]; });
+        return {};
+    }
+
+    GltfFile& model_;
+    MeshBuilder& builder_;
+    Materials& materials_;
+    const Json& primitive_;
+    const std::string& where_;
+    std::map<std::string, int>& dropped_;
+    Attributes attributes_;
+    std::uint64_t mode_ = 4;
+    std::size_t count_ = 0;  ///< of vertices
+    Primitive result_;
+};
+
 }  // namespace
 
 Result<Primitive> readPrimitive(GltfFile& model, MeshBuilder& builder, Materials& materials,
                                 const Json& primitive, const std::string& where,
                                 const std::vector<double>& morphWeights,
                                 std::map<std::string, int>& dropped) {
-    Primitive result;
-    auto& part = result.part;
-    part.where = where;
-    STX_TRY(const auto modeValue, getUint(primitive, "mode", where));
-    const auto mode = modeValue.value_or(4);
-    if (mode > 6)
-        return fail(ErrorCode::invalidInput, "{}.mode is {}, expected 0 to 6", where, mode);
-    if (mode >= 1 && mode <= 3) {
-        ++dropped["line primitives"];
-        result.drawn = false;
-        return result;
-    }
-    Attributes attributes(model, builder, primitive, where);
-    STX_CHECK(attributes.open());
-
-    STX_TRY(const auto position, attributes.get("POSITION", {"VEC3"}));
-    if (!position) {
-        ++dropped["primitives without positions"];
-        result.drawn = false;
-        return result;
-    }
-    const auto count = position->count;
-    STX_CHECK(checkCount(position, count, 3, where, "POSITION"));
-    part.positions = vectors<glm::dvec3>(*position);
-    // Points that are nowhere are left out later; a triangle needs all of its corners.
-    for (std::size_t i = 0; mode != 0 && i < count; ++i) {
-        const auto p = part.positions[i];
-        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-            return fail(ErrorCode::invalidInput,
-                        "{}: vertex {} is at ({}, {}, {}); positions must be finite numbers",
-                        attributes.source("POSITION"), i, p.x, p.y, p.z);
-    }
-    STX_TRY(const auto normal, attributes.get("NORMAL", {"VEC3"}));
-    STX_CHECK(checkCount(normal, count, 3, where, "NORMAL"));
-    if (normal) part.normals = vectors<glm::vec3>(*normal);
-    STX_TRY(const auto tangent, attributes.get("TANGENT", {"VEC4"}));
-    STX_CHECK(checkCount(tangent, count, 4, where, "TANGENT"));
-    if (tangent) part.tangents = vectors<glm::vec4>(*tangent);
-    STX_TRY(const auto colour, attributes.get("COLOR_0", {"VEC3", "VEC4"}));
-    STX_CHECK(checkCount(colour, count, 3, where, "COLOR_0"));
-    if (colour) {
-        part.colours = vectors<glm::vec4>(*colour);
-        if (colour->components == 3) {
-            for (auto& c : part.colours) c.a = 1.0f;
-        }
-    }
-    if (attributes.has("COLOR_1")) ++dropped["further vertex colours"];
-
-    STX_TRY(const auto materialIndex, getUint(primitive, "material", where));
-    STX_TRY(auto material, materials.use(materialIndex, where));
-    const auto readUvs = [&](const UvSource& source) -> Result<std::vector<glm::vec2>> {
-        const auto name = fmt::format("TEXCOORD_{}", source.set);
-        STX_TRY(const auto values, attributes.get(name, {"VEC2"}));
-        STX_CHECK(checkCount(values, count, 2, where, name));
-        std::vector<glm::vec2> uvs;
-        if (!values) return uvs;
-        uvs = vectors<glm::vec2>(*values);
-        for (auto& uv : uvs) uv = source.apply(uv);
-        return uvs;
-    };
-    STX_TRY(part.uvs, readUvs(material.baseColour));
-    if (material.normal.used) {
-        auto source = material.normal;
-        if (!material.baseColour.used) {
-            // Then uvs serve the normal map alone.
-            STX_TRY(part.uvs, readUvs(source));
-            part.normalUvs = {};
-        } else if (source.set != material.baseColour.set ||
-                   source.offset != material.baseColour.offset ||
-                   source.scale != material.baseColour.scale ||
-                   source.rotation != material.baseColour.rotation) {
-            STX_TRY(part.normalUvs, readUvs(source));
-        }
-    }
-    TexturesKept kept;
-    kept.baseColour = !material.baseColour.used || !part.uvs.empty();
-    kept.normal = !material.normal.used || !(part.normalUvs.empty() && part.uvs.empty()) ||
-                  position->count == 0;
-    // Whether a map has coordinates: its own, which are read here, or the base colour's.
-    const auto readOwn = [&](const UvSource& source, std::vector<glm::vec2>& own) -> Result<bool> {
-        if (!source.used || source == material.baseColour) return kept.baseColour;
-        STX_TRY(own, readUvs(source));
-        return !own.empty();
-    };
-    STX_TRY(kept.metallicRoughness, readOwn(material.metallicRoughness, part.metallicRoughnessUvs));
-    STX_TRY(kept.emissive, readOwn(material.emissive, part.emissiveUvs));
-    if (kept != TexturesKept()) {
-        model.job().note(
-            fmt::format("{} has a textured material but no texture coordinates for it; the "
-                        "plain colour is used",
-                        where));
-        material = materials.withoutTextures(material, kept);
-    }
-    part.material = material.index;
-
-    for (int set = 0; set < 4; ++set) {
-        STX_TRY(auto joints, attributes.get(fmt::format("JOINTS_{}", set), {"VEC4"}));
-        STX_TRY(auto weights, attributes.get(fmt::format("WEIGHTS_{}", set), {"VEC4"}));
-        if (!joints || !weights) break;
-        STX_CHECK(checkCount(joints, count, 4, where, "JOINTS"));
-        STX_CHECK(checkCount(weights, count, 4, where, "WEIGHTS"));
-        result.influences.push_back({std::move(*joints), std::move(*weights)});
-    }
-    STX_CHECK(applyMorph(model, primitive, where, morphWeights, part));
-
-    if (mode == 0) {
-        part.points = true;
-        return result;
-    }
-    if (attributes.draco()) {
-        part.triangles = attributes.draco()->triangles();
-        return result;
-    }
-    STX_TRY(const auto indexAccessor, getUint(primitive, "indices", where));
-    if (!indexAccessor) {
-        STX_CHECK(builder.charge(count, sizeof(glm::uvec3), where));
-        part.triangles =
-            assemble(mode, count, [](std::size_t i) { return static_cast<std::uint32_t>(i); });
-        return result;
-    }
-    STX_TRY(const auto indices, model.indices(*indexAccessor, where + " indices"));
-    for (std::size_t i = 0; i < indices.size(); ++i) {
-        if (indices[i] >= count)
-            return fail(
-                ErrorCode::invalidInput,
-                "accessors[{}] ({} indices): index {} is vertex {}, but there are only {} vertices",
-                *indexAccessor, where, i, indices[i], count);
-    }
-    STX_CHECK(builder.charge(indices.size(), sizeof(glm::uvec3), where));
-    part.triangles = assemble(mode, indices.size(), [&](std::size_t i) { return indices[i]; });
-    return result;
+    return PrimitiveReader(model, builder, materials, primitive, where, dropped).read(morphWeights);
 }
 
 }  // namespace stx::gltf

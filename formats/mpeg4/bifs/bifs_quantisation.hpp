@@ -1,7 +1,6 @@
 #pragma once
 
 #include <optional>
-#include <vector>
 
 #include "formats/mpeg4/bifs/bit_stream.hpp"
 #include "formats/mpeg4/scene/scene.hpp"

@@ -45,10 +45,7 @@ Result<void> BifsNodeWriter::write(std::int32_t value, const Coding& coding) {
     return out.write(static_cast<std::uint32_t>(above), coding->bits), Result<void>{};
 }
 Result<void> BifsNodeWriter::write(float value, const Coding& coding) {
-    if (coding)
-        writeQuantised(out, *coding, 0, value);
-    else
-        writeFloat(value);
+    writeComponent(coding, 0, value);
     return {};
 }
 Result<void> BifsNodeWriter::write(double value, const Coding&) {
@@ -66,13 +63,14 @@ Result<void> BifsNodeWriter::write(const Url& value, const Coding&) {
     out.write(static_cast<std::uint32_t>(value.objectDescriptorId), 10);
     return {};
 }
+void BifsNodeWriter::writeComponent(const Coding& coding, int component, float value) {
+    if (coding)
+        writeQuantised(out, *coding, component, value);
+    else
+        writeFloat(value);
+}
 Result<void> BifsNodeWriter::write(const glm::vec2& value, const Coding& coding) {
-    for (int i = 0; i < 2; ++i) {
-        if (coding)
-            writeQuantised(out, *coding, i, value[i]);
-        else
-            writeFloat(value[i]);
-    }
+    for (int i = 0; i < 2; ++i) writeComponent(coding, i, value[i]);
     return {};
 }
 Result<void> BifsNodeWriter::write(const glm::vec3& value, const Coding& coding) {
@@ -80,12 +78,7 @@ Result<void> BifsNodeWriter::write(const glm::vec3& value, const Coding& coding)
         writeQuantisedNormal(out, *coding, value);
         return {};
     }
-    for (int i = 0; i < 3; ++i) {
-        if (coding)
-            writeQuantised(out, *coding, i, value[i]);
-        else
-            writeFloat(value[i]);
-    }
+    for (int i = 0; i < 3; ++i) writeComponent(coding, i, value[i]);
     return {};
 }
 Result<void> BifsNodeWriter::write(const Color& value, const Coding& coding) {

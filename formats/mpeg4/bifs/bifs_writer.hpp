@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -54,6 +53,7 @@ struct BifsNodeWriter {
     using Coding = std::optional<QuantisedCoding>;
 
     void writeFloat(float value);
+    void writeComponent(const Coding& coding, int component, float value);
     Result<void> writeString(const std::string& text);
     Result<void> writeName(const std::string& text);
     Result<void> write(bool value, const Coding&);

@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <cstdint>
-#include <string_view>
 
 #include "formats/files/files.hpp"
 

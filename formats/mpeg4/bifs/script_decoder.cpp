@@ -91,14 +91,16 @@ class ScriptReader {
     }
 
     /// `a, b`
-    Result<void> identifiers() {
-        bool first = true;
-        while (in_.flag()) {
+    template <class Item>
+    Result<void> list(const Item& item) {
+        for (bool first = true; in_.flag(); first = false) {
             if (!first) out_ += ", ";
-            first = false;
-            STX_CHECK(identifier());
+            STX_CHECK(item());
         }
         return check();
+    }
+    Result<void> identifiers() {
+        return list([&] { return identifier(); });
     }
     Result<void> arguments() {
         out_ += '(';
@@ -108,12 +110,7 @@ class ScriptReader {
     }
     Result<void> parameters() {
         out_ += '(';
-        bool first = true;
-        while (in_.flag()) {
-            if (!first) out_ += ", ";
-            first = false;
-            STX_CHECK(expression(kAssignment));
-        }
+        STX_CHECK(list([&] { return expression(kAssignment); }));
         out_ += ')';
         return check();
     }

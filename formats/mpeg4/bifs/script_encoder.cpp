@@ -171,27 +171,24 @@ class ScriptWriter {
         for (const char c : text) out_.write(static_cast<unsigned char>(c), 8);
         out_.write(0, 8);
     }
-    Result<void> arguments() {
+    /// `(a, b)`
+    template <class Item>
+    Result<void> inParentheses(const Item& item) {
         STX_CHECK(take("("));
         while (!isMark(")")) {
             out_.flag(true);
-            STX_CHECK(identifier());
+            STX_CHECK(item());
             if (!isMark(",")) break;
             STX_CHECK(next());
         }
         out_.flag(false);
         return take(")");
     }
+    Result<void> arguments() {
+        return inParentheses([&] { return identifier(); });
+    }
     Result<void> parameters() {
-        STX_CHECK(take("("));
-        while (!isMark(")")) {
-            out_.flag(true);
-            STX_CHECK(expression(kAssignment));
-            if (!isMark(",")) break;
-            STX_CHECK(next());
-        }
-        out_.flag(false);
-        return take(")");
+        return inParentheses([&] { return expression(kAssignment); });
     }
 
     // ---- statements

@@ -1,6 +1,5 @@
 #include "formats/mpeg4/mapping/background.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include <glm/gtc/constants.hpp>

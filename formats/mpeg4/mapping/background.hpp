@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/mapping/stream_images.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"

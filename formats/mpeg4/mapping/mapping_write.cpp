@@ -212,11 +212,7 @@ class SceneWriter {
         }
         NodePtr node = makeNode("DepthImage");
         node->defName = defNameOf(bundle_.views[i], i, key, notes);
-        const Camera& c = padding.camera;
-        const glm::dvec4 turn = axisAngleFromQuat(c.orientation);
-        node->set("position", glm::vec3(c.position));
-        node->set("orientation", Rotation{glm::vec3(turn), static_cast<float>(turn.w)});
-        node->set("fieldOfView", glm::vec2(c.fieldOfView()));
+        setCamera(*node, padding.camera);
         node->set("orthographic", true);
         NodePtr texture = makeNode("SimpleTexture");
         STX_TRY(NodePtr image, textureNode(node->defName, "texture", std::move(bytes)));
@@ -303,14 +299,10 @@ class SceneWriter {
         const bool v2 = isV2(view);
         NodePtr node = makeNode(v2 ? "DepthImageV2" : "DepthImage");
         node->defName = defNameOf(view, i, key, notes);
-        const Camera& c = images.padding.camera;
-        const glm::dvec4 turn = axisAngleFromQuat(c.orientation);
-        node->set("position", glm::vec3(c.position));
-        node->set("orientation", Rotation{glm::vec3(turn), static_cast<float>(turn.w)});
-        node->set("fieldOfView", glm::vec2(c.fieldOfView()));
+        setCamera(*node, images.padding.camera);
         node->set("nearPlane", images.nearPlane);
         node->set("farPlane", images.farPlane);
-        node->set("orthographic", c.orthographic);
+        node->set("orthographic", images.padding.camera.orthographic);
         if (v2) {
             const glm::vec2 range = view.hasSplats() && !options_.pointTexture
                                         ? glm::vec2(-images.longestSplat, images.longestSplat)

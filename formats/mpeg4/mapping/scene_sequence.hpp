@@ -1,6 +1,5 @@
 #pragma once
 
-#include <filesystem>
 #include <memory>
 
 #include "formats/mpeg4/mapping/mapping.hpp"

@@ -388,11 +388,7 @@ class SequenceWriter {
                         was.cx, was.cy, view.camera.cx, view.camera.cy);
         track.camera = view.camera;
         NodePtr node = std::make_shared<Node>(*track.node);
-        const Camera& c = images.padding.camera;
-        const glm::dvec4 turn = axisAngleFromQuat(c.orientation);
-        node->set("position", glm::vec3(c.position));
-        node->set("orientation", Rotation{glm::vec3(turn), static_cast<float>(turn.w)});
-        node->set("fieldOfView", glm::vec2(c.fieldOfView()));
+        setCamera(*node, images.padding.camera);
         if (sameNode(node, track.node)) return {};
         if (document_.frames.back().time != now || document_.frames.size() == 1) {
             CommandFrame frame;

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <string>
 #include <unordered_map>
 
 #include "formats/mpeg4/mapping/mapping.hpp"

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-
 #include "formats/images/images.hpp"
 #include "formats/mpeg4/scene/placement.hpp"
 #include "formats/mpeg4/scene/scene.hpp"

@@ -23,6 +23,13 @@ float floatAbove(double v) {
 
 }  // namespace
 
+void setCamera(Node& node, const Camera& camera) {
+    const glm::dvec4 turn = axisAngleFromQuat(camera.orientation);
+    node.set("position", glm::vec3(camera.position));
+    node.set("orientation", Rotation{glm::vec3(turn), static_cast<float>(turn.w)});
+    node.set("fieldOfView", glm::vec2(camera.fieldOfView()));
+}
+
 bool isWrittenAsV2(const ReferenceView& view, const SceneWriteOptions& options) {
     if (options.nodes == SceneWriteOptions::Nodes::automatic)
         return view.hasNormals() || view.hasSplats();

@@ -27,6 +27,9 @@ struct ViewImages {
                                             const SceneWriteOptions& options, const Limits& limits,
                                             float longestSplat = 0);
 
+/// Position, orientation and fieldOfView of a DepthImage.
+void setCamera(Node& node, const Camera& camera);
+
 /// Whether the view becomes a DepthImageV2.
 [[nodiscard]] bool isWrittenAsV2(const ReferenceView& view, const SceneWriteOptions& options);
 /// 8 or 16.

@@ -1,6 +1,5 @@
 #include "formats/mpeg4/scene/node_table.hpp"
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <unordered_map>

@@ -12,7 +12,7 @@ namespace {
 class BtWriter {
   public:
     BtWriter(const Document& document, TextNames names)
-        : document_(document), names_(std::move(names)) {}
+        : document_(document), scope_{std::move(names), nullptr, {}} {}
 
     Result<std::string> write() {
         writeInitialDescriptor();
@@ -25,16 +25,13 @@ class BtWriter {
                 if (const auto* scene = std::get_if<ReplaceScene>(&frame.commands[0]);
                     scene && scene->root) {
                     line("");
-                    names_.beginScene();
+                    scope_.names.beginScene();
                     writeProtos(scene->protos);
                     indent();
                     writeNode(scene->root);
                     out_ += '\n';
                     for (const Route& route : scene->routes) {
-                        indent();
-                        writeRouteName(route);
-                        out_ += "ROUTE ";
-                        writeRoute(route);
+                        writeRouteStatement(route);
                         out_ += '\n';
                     }
                     first = 1;
@@ -83,15 +80,15 @@ class BtWriter {
             out_ += "NULL";
             return;
         }
-        if (const std::string* defName = names_.find(*node)) {
-            if (!names_.firstTime(*node)) {
+        if (const std::string* defName = scope_.names.find(*node)) {
+            if (!scope_.names.firstTime(*node)) {
                 out_ += "USE " + *defName;
                 return;
             }
             out_ += "DEF " + *defName + ' ';
         }
         out_ += node->info->name;
-        const std::map<int, int>& links = linksOf(links_, *node);
+        const std::map<int, int>& links = linksOf(scope_.links, *node);
         const int own = ownFieldCount(*node);
         if (node->setFields.empty() && links.empty() && own == 0) {
             out_ += " { }";
@@ -108,7 +105,7 @@ class BtWriter {
             out_ += field.name;
             out_ += ' ';
             if (link != links.end())
-                out_ += "IS " + proto_->type.fields[link->second].name;
+                out_ += "IS " + scope_.proto->type.fields[link->second].name;
             else if (field.hasValue())
                 writeValue(toText(*node->info, field.index, node->value(field.index)));
             out_ += '\n';
@@ -139,9 +136,7 @@ class BtWriter {
         }
         out_ += "] {\n";
         ++depth_;
-        TextNames outerNames = std::exchange(names_, TextNames::ofBody(proto));
-        const Proto* const outerProto = std::exchange(proto_, &proto);
-        ProtoLinks outerLinks = std::exchange(links_, linksOf(proto));
+        WritingScope outer = std::exchange(scope_, WritingScope::ofBody(proto));
         writeProtos(proto.protos);
         for (const NodePtr& node : proto.body) {
             indent();
@@ -149,15 +144,10 @@ class BtWriter {
             out_ += '\n';
         }
         for (const Route& route : proto.routes) {
-            indent();
-            writeRouteName(route);
-            out_ += "ROUTE ";
-            writeRoute(route);
+            writeRouteStatement(route);
             out_ += '\n';
         }
-        proto_ = outerProto;
-        links_ = std::move(outerLinks);
-        names_ = std::move(outerNames);
+        scope_ = std::move(outer);
         --depth_;
         line("}}");
     }
@@ -186,7 +176,7 @@ class BtWriter {
     }
 
     void writeBuffer(const CommandBuffer& buffer) {
-        const auto commands = commandsToWrite(names_, buffer, bufferDepth_, fits_);
+        const auto commands = commandsToWrite(scope_.names, buffer, bufferDepth_, fits_);
         if (commands.empty()) {
             out_ += "{ }";
             return;
@@ -194,17 +184,13 @@ class BtWriter {
         out_ += "{\n";
         ++depth_;
         ++bufferDepth_;
-        TextNames outerNames = std::move(names_);
-        names_ = TextNames::inside(outerNames);
-        const Proto* const outerProto = std::exchange(proto_, nullptr);
-        ProtoLinks outerLinks = std::exchange(links_, {});
+        WritingScope outer = std::move(scope_);
+        scope_ = WritingScope::inside(outer);
         for (const Command& command : commands) {
             std::visit([&](const auto& c) { write(c); }, command);
             out_ += '\n';
         }
-        proto_ = outerProto;
-        links_ = std::move(outerLinks);
-        names_ = std::move(outerNames);
+        scope_ = std::move(outer);
         --bufferDepth_;
         --depth_;
         indent();
@@ -213,7 +199,7 @@ class BtWriter {
 
     // ---- Commands
     [[nodiscard]] std::string nameOf(const NodePtr& node) const {
-        const std::string* found = node ? names_.find(*node) : nullptr;
+        const std::string* found = node ? scope_.names.find(*node) : nullptr;
         return found ? *found : "NULL";
     }
     [[nodiscard]] std::string fieldOf(const NodePtr& node, int field) const {
@@ -223,11 +209,17 @@ class BtWriter {
         return position.index == Position::kLast ? "[LAST]" : fmt::format("[{}]", position.index);
     }
     void writeRouteName(const Route& route) {
-        if (const std::string text = names_.define(route); !text.empty())
+        if (const std::string text = scope_.names.define(route); !text.empty())
             out_ += "DEF " + text + ' ';
     }
     void writeRoute(const Route& route) {
         out_ += fieldOf(route.from, route.fromField) + " TO " + fieldOf(route.to, route.toField);
+    }
+    void writeRouteStatement(const Route& route) {
+        indent();
+        writeRouteName(route);
+        out_ += "ROUTE ";
+        writeRoute(route);
     }
     void beginCommand(std::string_view words) {
         indent();
@@ -240,7 +232,7 @@ class BtWriter {
     }
     void write(const ReplaceScene& c) {
         beginCommand("REPLACE SCENE BY ");
-        names_.beginScene();
+        scope_.names.beginScene();
         if (!c.protos.empty()) {
             out_ += '\n';
             writeProtos(c.protos);
@@ -249,10 +241,7 @@ class BtWriter {
         writeNode(c.root);
         for (const Route& route : c.routes) {
             out_ += '\n';
-            indent();
-            writeRouteName(route);
-            out_ += "ROUTE ";
-            writeRoute(route);
+            writeRouteStatement(route);
         }
     }
     void write(const ReplaceNode& c) {
@@ -268,7 +257,7 @@ class BtWriter {
         writeValue(c.value);
     }
     void write(const ReplaceRoute& c) {
-        beginCommand("REPLACE ROUTE " + names_.routeOf(c.routeId) + " BY ");
+        beginCommand("REPLACE ROUTE " + scope_.names.routeOf(c.routeId) + " BY ");
         writeRoute(c.route);
     }
     void writeInsert(const std::string& target, Position position) {
@@ -295,7 +284,9 @@ class BtWriter {
     void write(const DeleteIndexed& c) {
         beginCommand("DELETE " + fieldOf(c.target, c.field) + indexText(c.position));
     }
-    void write(const DeleteRoute& c) { beginCommand("DELETE ROUTE " + names_.routeOf(c.routeId)); }
+    void write(const DeleteRoute& c) {
+        beginCommand("DELETE ROUTE " + scope_.names.routeOf(c.routeId));
+    }
 
     // ---- Descriptors
     template <class T>
@@ -430,9 +421,7 @@ class BtWriter {
     }
 
     const Document& document_;
-    TextNames names_;
-    const Proto* proto_ = nullptr;  ///< whose body is written
-    ProtoLinks links_;
+    WritingScope scope_;
     Result<void> fits_;  ///< the first buffer of commands that has no text
     std::string out_;
     int depth_ = 0;

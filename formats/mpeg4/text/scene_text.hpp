@@ -6,6 +6,7 @@
 
 #include "formats/mpeg4/bifs/bifs.hpp"
 #include "formats/mpeg4/scene/document.hpp"
+#include "formats/mpeg4/scene/proto_links.hpp"
 #include "formats/mpeg4/text/text_buffers.hpp"
 #include "formats/mpeg4/text/text_fields.hpp"
 
@@ -85,6 +86,21 @@ class TextNames {
     std::unordered_set<const Node*> written_;
     std::unordered_map<std::uint32_t, std::string> routes_;  ///< names of those that were defined
     std::unordered_map<std::string, std::uint32_t> routeIds_;
+};
+
+/// Where a writer is: the names there, and the PROTO whose body it writes.
+struct WritingScope {
+    TextNames names;
+    const Proto* proto = nullptr;
+    ProtoLinks links;
+
+    [[nodiscard]] static WritingScope ofBody(const Proto& proto) {
+        return {TextNames::ofBody(proto), &proto, linksOf(proto)};
+    }
+    /// Of a buffer of commands; `outer` must stay where it is meanwhile.
+    [[nodiscard]] static WritingScope inside(const WritingScope& outer) {
+        return {TextNames::inside(outer.names), nullptr, {}};
+    }
 };
 
 /// The commands of a buffer that is nested in `depth` others. Where they have no text they are left

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <unordered_set>
 #include <vector>
 
 #include "formats/mpeg4/bifs/bifs.hpp"

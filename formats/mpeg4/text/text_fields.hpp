@@ -46,9 +46,10 @@ void appendFieldValue(std::string& out, const FieldValue& value, TextStyle style
 class RouteNames {
   public:
     void define(const Route& route);
-    /// What a command that names a route has as its id until number(). Errors when there is none.
+    /// A number for a command that names a route, to be its id until number() gives the final one.
+    /// Errors when no route has the name.
     [[nodiscard]] Result<std::uint32_t> idOf(const std::string& name, const std::string& where);
-    /// Gives the routes that idOf() was asked for numbers that no other has.
+    /// Gives each route that idOf() was asked for an id that no other route has.
     void number(std::vector<CommandFrame>& frames) const;
 
   private:
@@ -61,19 +62,19 @@ class NodeNames {
   public:
     explicit NodeNames(const Limits& limits) : limits_(&limits) {}
 
-    /// Names inside of a buffer of commands, which may use all of `outer`, too, as it is then. What
-    /// is named in the buffer stays in it.
+    /// Names inside of a buffer of commands. Its commands may also use the names that `outer` has
+    /// by now; names that they give are known in the buffer alone.
     [[nodiscard]] static NodeNames inside(const NodeNames& outer) {
         NodeNames names = outer.ofBody();
         names.outer_ = &outer;
         return names;
     }
-    /// Goes on where the names of a buffer ended.
+    /// Counts what a buffer named, too, once it has been read.
     void goOn(const NodeNames& buffer) {
         count_ = buffer.count_;
         nameCount_ += buffer.nameCount_;
     }
-    /// The nodes that were named, in the order in which they ended.
+    /// The nodes that were named, in the order in which their texts end.
     [[nodiscard]] const std::vector<NodePtr>& named() const { return named_; }
 
     /// Names of a PROTO's body, which are apart, but count as part of the same text.
@@ -82,7 +83,7 @@ class NodeNames {
         names.count_ = count_;
         return names;
     }
-    /// Goes on counting where the names of a body ended.
+    /// Counts what a body named, too, once it has been read.
     void countOn(const NodeNames& body) { count_ = body.count_; }
 
     /// DEF: from here on `node` is open until closed() is called with the height of its tree.

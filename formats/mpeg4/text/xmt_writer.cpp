@@ -6,36 +6,22 @@
 #include "formats/mpeg4/text/text_values.hpp"
 #include "formats/mpeg4/text/xmt.hpp"
 #include "formats/mpeg4/text/xmt_types.hpp"
+#include "lib/base/code_point.hpp"
 
 namespace stx::mpeg4 {
 namespace {
 
 /// Bytes of the UTF-8 character at the start of `text` that XML can hold; 0: none.
-int xmlCharacter(std::string_view text) {
-    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-    const unsigned char first = byte(0);
-    if (first < 0x80) return first >= 32 || first == '\t' || first == '\n' || first == '\r' ? 1 : 0;
-    const int length = first >= 0xF0 && first < 0xF5 ? 4
-                       : first >= 0xE0               ? 3
-                       : first >= 0xC2               ? 2
-                                                     : 0;
-    if (length == 0 || first >= 0xF5 || text.size() < static_cast<std::size_t>(length)) return 0;
-    std::uint32_t code = first & (0x7F >> length);
-    for (int i = 1; i < length; ++i) {
-        if ((byte(i) & 0xC0) != 0x80) return 0;
-        code = code << 6 | (byte(i) & 0x3F);
-    }
-    const std::uint32_t least = length == 2 ? 0x80 : length == 3 ? 0x800 : 0x10000;
-    if (code < least || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000) || code == 0xFFFE ||
-        code == 0xFFFF)
-        return 0;
-    return length;
+std::size_t xmlCharacter(std::string_view text) {
+    const CodePoint c = firstCodePoint(text);
+    const bool control = c.value < 32 && c.value != '\t' && c.value != '\n' && c.value != '\r';
+    return control || c.value == 0xFFFE || c.value == 0xFFFF ? 0 : c.bytes;
 }
 
 class XmtWriter {
   public:
     XmtWriter(const Document& document, TextNames names, Job& job)
-        : document_(document), names_(std::move(names)), job_(job) {}
+        : document_(document), scope_{std::move(names), nullptr, {}}, job_(job) {}
 
     Result<std::string> write() {
         out_ = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
@@ -81,14 +67,14 @@ class XmtWriter {
 
     void escape(std::string_view text) {
         while (!text.empty()) {
-            const int length = xmlCharacter(text);
+            const std::size_t length = xmlCharacter(text);
             if (length == 0) {
                 out_ += "\xEF\xBF\xBD";
                 replaced_ = true;
                 text.remove_prefix(1);
                 continue;
             }
-            const std::string_view character = text.substr(0, static_cast<std::size_t>(length));
+            const std::string_view character = text.substr(0, length);
             switch (character[0]) {
                 case '&':
                     out_ += "&amp;";
@@ -172,15 +158,15 @@ class XmtWriter {
         const std::string type = node->proto ? "ProtoInstance" : node->info->name;
         Attributes attributes;
         if (node->proto) attributes.push_back({"name", node->info->name});
-        if (const std::string* defName = names_.find(*node)) {
-            if (!names_.firstTime(*node)) {
+        if (const std::string* defName = scope_.names.find(*node)) {
+            if (!scope_.names.firstTime(*node)) {
                 attributes.push_back({"USE", *defName});
                 empty(type, attributes);
                 return;
             }
             attributes.push_back({"DEF", *defName});
         }
-        const std::map<int, int>& links = linksOf(links_, *node);
+        const std::map<int, int>& links = linksOf(scope_.links, *node);
         const int own = ownFieldCount(*node);
         const int ownFrom = static_cast<int>(node->info->fields.size()) - own;
         bool hasNodes = own > 0 || !links.empty() || (node->proto && !node->setFields.empty());
@@ -229,7 +215,7 @@ class XmtWriter {
             open("IS");
             for (const auto& [field, protoField] : links)
                 empty("connect", {{"nodeField", node->info->fields[field].name},
-                                  {"protoField", proto_->type.fields[protoField].name}});
+                                  {"protoField", scope_.proto->type.fields[protoField].name}});
             close("IS");
         }
         close(type);
@@ -267,42 +253,34 @@ class XmtWriter {
         open("ProtoDeclare", attributes);
         for (const FieldInfo& field : proto.type.fields)
             writeDeclaration(field, &defaultValue(proto.type, field.index));
-        TextNames outerNames = std::exchange(names_, TextNames::ofBody(proto));
-        const Proto* const outerProto = std::exchange(proto_, &proto);
-        ProtoLinks outerLinks = std::exchange(links_, linksOf(proto));
+        WritingScope outer = std::exchange(scope_, WritingScope::ofBody(proto));
         for (const ProtoPtr& inner : proto.protos) writeProto(*inner);
         for (const NodePtr& node : proto.body) writeNode(node);
         for (const Route& route : proto.routes) writeRoute(route);
-        links_ = std::move(outerLinks);
-        proto_ = outerProto;
-        names_ = std::move(outerNames);
+        scope_ = std::move(outer);
         close("ProtoDeclare");
     }
 
     void writeBuffer(const CommandBuffer& buffer) {
-        const auto commands = commandsToWrite(names_, buffer, bufferDepth_, fits_);
+        const auto commands = commandsToWrite(scope_.names, buffer, bufferDepth_, fits_);
         if (commands.empty()) {
             empty("buffer");
             return;
         }
         open("buffer");
         ++bufferDepth_;
-        TextNames outerNames = std::move(names_);
-        names_ = TextNames::inside(outerNames);
-        const Proto* const outerProto = std::exchange(proto_, nullptr);
-        ProtoLinks outerLinks = std::exchange(links_, {});
+        WritingScope outer = std::move(scope_);
+        scope_ = WritingScope::inside(outer);
         for (const Command& command : commands)
             std::visit([&](const auto& c) { write(c); }, command);
-        proto_ = outerProto;
-        links_ = std::move(outerLinks);
-        names_ = std::move(outerNames);
+        scope_ = std::move(outer);
         --bufferDepth_;
         close("buffer");
     }
 
     // ---- Commands
     [[nodiscard]] std::string nameOf(const NodePtr& node) const {
-        const std::string* found = node ? names_.find(*node) : nullptr;
+        const std::string* found = node ? scope_.names.find(*node) : nullptr;
         return found ? *found : "";
     }
     static std::string positionText(Position position) {
@@ -313,7 +291,7 @@ class XmtWriter {
     }
     void writeRoute(const Route& route) {
         Attributes attributes;
-        if (std::string text = names_.define(route); !text.empty())
+        if (std::string text = scope_.names.define(route); !text.empty())
             attributes.push_back({"DEF", std::move(text)});
         attributes.push_back({"fromNode", nameOf(route.from)});
         attributes.push_back({"fromField", fieldName(route.from, route.fromField)});
@@ -340,7 +318,7 @@ class XmtWriter {
         }
     }
     void write(const ReplaceScene& c) {
-        names_.beginScene();
+        scope_.names.beginScene();
         open("Replace");
         open("Scene");
         for (const ProtoPtr& proto : c.protos) writeProto(*proto);
@@ -365,7 +343,7 @@ class XmtWriter {
                        c.value);
     }
     void write(const ReplaceRoute& c) {
-        open("Replace", {{"atRoute", names_.routeOf(c.routeId)}});
+        open("Replace", {{"atRoute", scope_.names.routeOf(c.routeId)}});
         writeRoute(c.route);
         close("Replace");
     }
@@ -392,7 +370,9 @@ class XmtWriter {
                          {"atField", fieldName(c.target, c.field)},
                          {"position", positionText(c.position)}});
     }
-    void write(const DeleteRoute& c) { empty("Delete", {{"atRoute", names_.routeOf(c.routeId)}}); }
+    void write(const DeleteRoute& c) {
+        empty("Delete", {{"atRoute", scope_.names.routeOf(c.routeId)}});
+    }
 
     // ---- Descriptors
     template <class T>
@@ -553,9 +533,7 @@ class XmtWriter {
     }
 
     const Document& document_;
-    TextNames names_;
-    const Proto* proto_ = nullptr;  ///< whose body is written
-    ProtoLinks links_;
+    WritingScope scope_;
     Job& job_;
     std::string out_;
     int depth_ = 0;

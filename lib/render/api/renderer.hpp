@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "lib/base/job.hpp"
 #include "lib/environment/environment_map.hpp"

@@ -53,9 +53,5 @@ struct BenchReport {
 
 /// The report as the paper's two tables, for people.
 [[nodiscard]] std::string benchText(const BenchReport& report);
-/// {"device","processor","threads","rows":[{"table","references","points","path","splat","fps","mpps"}]}
-[[nodiscard]] std::string benchJson(const BenchReport& report);
-/// A bar for each row, million points a second on a logarithmic scale, as an SVG picture.
-[[nodiscard]] std::string benchSvg(const BenchReport& report);
 
 }  // namespace stx

@@ -37,57 +37,21 @@ class GlObject {
     GLuint name_ = 0;
 };
 
-struct BufferTraits {
-    static GLuint create() {
+/// Of objects whose names OpenGL makes and deletes by the list: the addresses of its functions.
+template <auto* kCreate, auto* kGenerate, auto* kDelete>
+struct ListedTraits {
+    template <class... Target>
+    static GLuint create(Target... target) {
         GLuint n = 0;
-        glCreateBuffers(1, &n);
+        (*kCreate)(target..., 1, &n);
         return n;
     }
     static GLuint generate() {
         GLuint n = 0;
-        glGenBuffers(1, &n);
+        (*kGenerate)(1, &n);
         return n;
     }
-    static void destroy(GLuint n) { glDeleteBuffers(1, &n); }
-};
-struct TextureTraits {
-    static GLuint create(GLenum target) {
-        GLuint n = 0;
-        glCreateTextures(target, 1, &n);
-        return n;
-    }
-    static GLuint generate() {
-        GLuint n = 0;
-        glGenTextures(1, &n);
-        return n;
-    }
-    static void destroy(GLuint n) { glDeleteTextures(1, &n); }
-};
-struct FramebufferTraits {
-    static GLuint create() {
-        GLuint n = 0;
-        glCreateFramebuffers(1, &n);
-        return n;
-    }
-    static GLuint generate() {
-        GLuint n = 0;
-        glGenFramebuffers(1, &n);
-        return n;
-    }
-    static void destroy(GLuint n) { glDeleteFramebuffers(1, &n); }
-};
-struct VertexArrayTraits {
-    static GLuint create() {
-        GLuint n = 0;
-        glCreateVertexArrays(1, &n);
-        return n;
-    }
-    static GLuint generate() {
-        GLuint n = 0;
-        glGenVertexArrays(1, &n);
-        return n;
-    }
-    static void destroy(GLuint n) { glDeleteVertexArrays(1, &n); }
+    static void destroy(GLuint n) { (*kDelete)(1, &n); }
 };
 struct ShaderTraits {
     static GLuint create(GLenum type) { return glCreateShader(type); }
@@ -98,10 +62,12 @@ struct ProgramTraits {
     static void destroy(GLuint n) { glDeleteProgram(n); }
 };
 
-using GlBuffer = GlObject<BufferTraits>;
-using GlTexture = GlObject<TextureTraits>;
-using GlFramebuffer = GlObject<FramebufferTraits>;
-using GlVertexArray = GlObject<VertexArrayTraits>;
+using GlBuffer = GlObject<ListedTraits<&glCreateBuffers, &glGenBuffers, &glDeleteBuffers>>;
+using GlTexture = GlObject<ListedTraits<&glCreateTextures, &glGenTextures, &glDeleteTextures>>;
+using GlFramebuffer =
+    GlObject<ListedTraits<&glCreateFramebuffers, &glGenFramebuffers, &glDeleteFramebuffers>>;
+using GlVertexArray =
+    GlObject<ListedTraits<&glCreateVertexArrays, &glGenVertexArrays, &glDeleteVertexArrays>>;
 using GlShader = GlObject<ShaderTraits>;
 using GlProgram = GlObject<ProgramTraits>;
 

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <span>
-#include <vector>
-
 #include "lib/geometry/camera.hpp"
 #include "lib/render/splat/block_task.hpp"
 

@@ -14,6 +14,7 @@
 #include "lib/geometry/view_layout.hpp"
 #include "lib/metrics/compare.hpp"
 #include "lib/render/api/frame_picture.hpp"
+#include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/factory.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
 #include "tests/naive_warp.hpp"
@@ -120,6 +121,34 @@ INSTANTIATE_TEST_SUITE_P(
         std::erase(name, '.');
         return name;
     });
+
+// What the step `mixed` of refining is worth: splats of pixels that hang between two surfaces cover
+// what is behind them.
+TEST(FlyingPixels, AreWorthLeavingOutOfSplats) {
+    constexpr int kViews = 4;
+    const auto cameraAt = [](double index) {
+        return analyticCamera(AnalyticScene::room, index, kViews).resized(480, 360);
+    };
+    Bundle bundle;
+    for (int i = 0; i < kViews; ++i)
+        bundle.views.push_back(viewOfAnalyticScene(AnalyticScene::room, cameraAt(i), 2));
+    noisy::mixEdges(bundle, 0.5);
+    const auto truth = viewOfAnalyticScene(AnalyticScene::room, cameraAt(1.5), 2);
+    const auto drawn = [&](const char* steps) {
+        RenderSettings settings;
+        settings.mode = RenderMode::splat;
+        settings.refine = *RefineSettings::from(steps);
+        Job job;
+        const auto renderer = makeRenderer(Backend::cpu, bundle, settings, -1, job);
+        EXPECT_TRUE(renderer);
+        const auto frame = (*renderer)->render(truth.camera);
+        EXPECT_TRUE(frame);
+        return psnr(*frame, *truth.texture.rgba8());
+    };
+    const double with = drawn("auto,mixed"), without = drawn("auto");
+    std::printf("without flying pixels %.2f dB, with them %.2f\n", with, without);
+    EXPECT_GT(with, without + kTolerance);
+}
 
 // A sheet whose border every view shows: each more view could bite another piece out of it.
 TEST(HardScenesPlane, BetterQualityIsNoWorseOnATwoSidedSheet) {

@@ -101,22 +101,30 @@ glm::dvec2 distorted(glm::dvec2 pixel, glm::dvec2 f, glm::dvec2 c, double k1, do
             f.y * (n.y * radial + p1 * (r2 + 2 * n.y * n.y) + 2 * p2 * n.x * n.y) + c.y};
 }
 
+/// A set of COLMAP's with one picture of 96x64, whose colours are positions, behind the lens of a
+/// line of cameras.txt, and depthOf(pixel).
+template <class DepthOf>
+Result<Bundle> readThroughLens(const std::string& cameras, const DepthOf& depthOf, Job& job) {
+    TemporaryFolder folder;
+    writeText(folder / "sparse/cameras.txt", cameras);
+    writeText(folder / "sparse/images.txt", "1 1 0 0 0 0 0 0 1 a.exr\n\n");
+    writePositions(folder / "images/a.exr", 96, 64);
+    std::string depth = "96&64&1&";
+    for (int i = 0; i < 96 * 64; ++i) depth += floatBytes(depthOf(i));
+    writeText(folder / "stereo/depth_maps/a.exr.geometric.bin", depth);
+    ImageSetOptions options;
+    options.refine.set(RefineStep::mixed, false);
+    return readImageSet(folder.path(), options, job);
+}
+
 TEST(ColmapTraps, AFisheyeIsUndoneToAThousandthOfAPixel) {
     const double k[4] = {-0.04, 0.01, -0.003, 0.0005};
     for (const auto* line : {"OPENCV_FISHEYE 96 64 60 60 50 30 -0.04 0.01 -0.003 0.0005",
                              "SIMPLE_RADIAL_FISHEYE 96 64 60 50 30 -0.04"}) {
         const int terms = std::string_view(line).starts_with("SIMPLE") ? 1 : 4;
-        TemporaryFolder folder;
-        writeText(folder / "sparse/cameras.txt", fmt::format("1 {}\n", line));
-        writeText(folder / "sparse/images.txt", "1 1 0 0 0 0 0 0 1 a.exr\n\n");
-        writePositions(folder / "images/a.exr", 96, 64);
-        std::string depth = "96&64&1&";
-        for (int i = 0; i < 96 * 64; ++i) depth += floatBytes(2.0f);
-        writeText(folder / "stereo/depth_maps/a.exr.geometric.bin", depth);
         Job job;
-        ImageSetOptions options;
-        options.refine.set(RefineStep::mixed, false);
-        const auto read = readImageSet(folder.path(), options, job);
+        const auto read = readThroughLens(
+            fmt::format("1 {}\n", line), [](int) { return 2.0f; }, job);
         ASSERT_TRUE(read) << read.error().text();
         const ReferenceView& v = read->views[0];
         int checked = 0;
@@ -138,18 +146,10 @@ TEST(ColmapTraps, AFisheyeIsUndoneToAThousandthOfAPixel) {
 
 TEST(ColmapTraps, TheNoteSaysHowMuchOfAFisheyePictureIsCutAway) {
     for (const double f : {40.0, 60.0, 400.0}) {
-        TemporaryFolder folder;
-        writeText(folder / "sparse/cameras.txt",
-                  fmt::format("1 SIMPLE_RADIAL_FISHEYE 96 64 {} 50 30 0\n", f));
-        writeText(folder / "sparse/images.txt", "1 1 0 0 0 0 0 0 1 a.exr\n\n");
-        writePositions(folder / "images/a.exr", 96, 64);
-        std::string depth = "96&64&1&";
-        for (int i = 0; i < 96 * 64; ++i) depth += floatBytes(2.0f);
-        writeText(folder / "stereo/depth_maps/a.exr.geometric.bin", depth);
         Job job;
-        ImageSetOptions options;
-        options.refine.set(RefineStep::mixed, false);
-        const auto read = readImageSet(folder.path(), options, job);
+        const auto read = readThroughLens(
+            fmt::format("1 SIMPLE_RADIAL_FISHEYE 96 64 {} 50 30 0\n", f), [](int) { return 2.0f; },
+            job);
         ASSERT_TRUE(read) << read.error().text();
         // The other way round: points of the fisheye's picture that the pinhole's does not have.
         int cut = 0, all = 0;
@@ -191,17 +191,9 @@ TEST(ColmapTraps, EachLensModelIsUndoneToAThousandthOfAPixel) {
                                  0.04,
                                  0.003,
                                  -0.002}}) {
-        TemporaryFolder folder;
-        writeText(folder / "sparse/cameras.txt", "1 " + m.line + "\n");
-        writeText(folder / "sparse/images.txt", "1 1 0 0 0 0 0 0 1 a.exr\n\n");
-        writePositions(folder / "images/a.exr", 96, 64);
-        std::string depth = "96&64&1&";
-        for (int i = 0; i < 96 * 64; ++i) depth += floatBytes(i % 96 == 7 ? 0.0f : 2.0f);
-        writeText(folder / "stereo/depth_maps/a.exr.geometric.bin", depth);
         Job job;
-        ImageSetOptions options;
-        options.refine.set(RefineStep::mixed, false);
-        const auto read = readImageSet(folder.path(), options, job);
+        const auto read = readThroughLens(
+            "1 " + m.line + "\n", [](int i) { return i % 96 == 7 ? 0.0f : 2.0f; }, job);
         ASSERT_TRUE(read) << read.error().text();
         const auto notes = job.takeNotes();
         const bool ideal = m.k1 == 0;

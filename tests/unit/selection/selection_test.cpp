@@ -259,7 +259,7 @@ TEST(Selection, AroundAMeshSixFacesAndTheCavity) {
     EXPECT_GT(s->selection.certificate, 0.8);
     for (const auto& c : s->cameras) EXPECT_TRUE(c.check());
     const auto svg = selectionPlotSvg(s->selection, "a <box> & more");
-    EXPECT_NE(svg.find("a &lt;box> &amp; more"), std::string::npos);
+    EXPECT_NE(svg.find("a &lt;box&gt; &amp; more"), std::string::npos);
     EXPECT_NE(svg.find("</svg>"), std::string::npos);
 }
 

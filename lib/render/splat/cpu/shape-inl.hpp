@@ -8,7 +8,6 @@
 #define STX_SPLAT_SHAPE_INL_HPP
 #endif
 
-#include <cmath>
 #include <cstring>
 
 #include <hwy/highway.h>

@@ -48,6 +48,23 @@ FrameUniforms uniformsOf(const GpuScene& scene, const RenderSettings& settings, 
     return u;
 }
 
+void addLights(const Lighting& settings, const Camera& novel, SplatFrame& frame) {
+    const Lighting lighting = lightsInWorld(settings, novel.worldFromCamera());
+    for (const auto& light : lighting.lights)
+        frame.lights.push_back(
+            {glm::vec4(light.vector, light.kind == Light::Kind::point ? 1.0f : 0.0f),
+             glm::vec4(light.colour, 0.0f)});
+    frame.uniforms.counts.w = static_cast<int>(frame.lights.size());
+    if (lighting.environment) {
+        const auto add = [&](const glm::vec3& light) {
+            frame.lights.push_back({glm::vec4(0.0f), glm::vec4(light, 0.0f)});
+        };
+        std::ranges::for_each(lighting.environment->harmonics(), add);
+        if (lighting.specular != glm::vec3(0.0f))
+            std::ranges::for_each(lighting.environment->glossTable(), add);
+    }
+}
+
 }  // namespace
 
 SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
@@ -131,20 +148,7 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
     const double weight = std::clamp(2147483647.0 / (steps * 4.0 * crowd), 1.0, kLargestWeight);
     frame.uniforms.scales = glm::vec4(std::floor(weight), steps / scene.maxColour, 0, 0);
 
-    const Lighting lighting = lightsInWorld(settings.lighting, novel.worldFromCamera());
-    for (const auto& light : lighting.lights)
-        frame.lights.push_back(
-            {glm::vec4(light.vector, light.kind == Light::Kind::point ? 1.0f : 0.0f),
-             glm::vec4(light.colour, 0.0f)});
-    frame.uniforms.counts.w = static_cast<int>(frame.lights.size());
-    if (lighting.environment) {
-        const auto add = [&](const glm::vec3& light) {
-            frame.lights.push_back({glm::vec4(0.0f), glm::vec4(light, 0.0f)});
-        };
-        std::ranges::for_each(lighting.environment->harmonics(), add);
-        if (lighting.specular != glm::vec3(0.0f))
-            std::ranges::for_each(lighting.environment->glossTable(), add);
-    }
+    addLights(settings.lighting, novel, frame);
     return frame;
 }
 

@@ -72,8 +72,8 @@ struct SampleFuser {
         /// Lanes in which a source does not show the point: it shows another surface there, or
         /// none.
         std::uint32_t others[kMostTileSources];
-        /// Lanes in which a sample of a source lies closely behind the point, which may give way
-        /// to it: nothing but extensions shows the point.
+        /// Lanes in which a sample of a source lies closely behind the point and may replace it:
+        /// only extensions show the point.
         std::uint32_t closelyBehind[kMostTileSources] = {};
         bool mayGiveWay = false;
     };
@@ -157,8 +157,8 @@ struct SampleFuser {
         }
     }
 
-    /// Which points of `asked` are rejected, or replaced by a sample closely behind, when the
-    /// sources are asked that do not show them.
+    /// Which points of `asked` the sources that do not show them reject, or replace by a sample
+    /// closely behind.
     HWY_INLINE PointMask askSources(const FramePoints& points, PointMask asked, Facets& facets,
                                     Opinions& o) const {
         const PointTag d;
@@ -208,8 +208,8 @@ struct SampleFuser {
         return hn::Or(maskOf(replaced), hn::AndNot(few, asked));
     }
 
-    /// rejected() of shaders/shared, for the points of `asked`: they are at depth `q` and are shown
-    /// by the source that `owner` is the index of among the sources of `pixel`.
+    /// rejected() of shaders/shared, for the points of `asked`, at depth `q`. `owner` is the
+    /// number, among the sources of `pixel`, of the source that shows each.
     HWY_INLINE PointMask rejected(Points q, Counts owner, PointMask asked) const {
         using shared::Votes;
         const PointTag d;

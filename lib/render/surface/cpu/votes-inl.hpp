@@ -16,7 +16,8 @@
 
 #include "lib/render/surface/prepare/votes.hpp"
 
-// Vectors of 16 points are lookups of 4x4 texels, too.
+// Where a vector holds 16 floats, it also holds 4x4 texels, and points look up theirs in it
+// (Window).
 #undef STX_VOTES_WINDOWS
 #define STX_VOTES_WINDOWS (HWY_MAX_BYTES >= 64 && !HWY_HAVE_SCALABLE)
 
@@ -91,10 +92,10 @@ struct SourcePoints {
     }
 };
 
-/// What of a source may be read many points at a time.
+/// The images of a source from which vectors of points read.
 struct VotingSource {
     const Source* source;
-    const float* q = nullptr;  ///< null: one point at a time
+    const float* q = nullptr;  ///< null: it is read one point at a time
     const std::uint8_t* info = nullptr;
     const std::uint8_t* levels = nullptr;  ///< null: no alpha
 
@@ -106,7 +107,8 @@ struct VotingSource {
     }
 };
 
-/// Where four pixels of a whole source are; those outside of it stand for their neighbours inside.
+/// The places, in the images of a whole source, of the four pixels around each point. A pixel
+/// beyond the picture's border has the place of the nearest one inside.
 struct FourTexels {
     Counts at[2][2];  ///< row, column
     PointMask column[2], row[2];
@@ -135,9 +137,9 @@ struct FourTexels {
     }
 };
 
-/// 4x4 texels of a whole source that hold all that some of its points lie between, and those
-/// around: gathering costs many times what looking up in a register does. Only where that takes
-/// them all.
+/// 4x4 texels of a whole source in a register, in which all points of a vector find the four pixels
+/// around them and those beside these. Looking up there takes a fraction of the time of gathering.
+/// `holds` is false where the points are too far apart for it.
 struct Window {
     bool holds = false;
     std::ptrdiff_t first = 0;  ///< texel
@@ -199,7 +201,7 @@ struct Window {
 #endif
 };
 
-/// Bytes of an image of so many, four or more, at those places.
+/// The bytes at `places` of an image of `count` bytes, which is four at least.
 HWY_INLINE Counts gatheredBytes(const std::uint8_t* from, std::int32_t count, Counts places) {
     const CountTag di;
     const hn::RebindToUnsigned<CountTag> du;
@@ -211,7 +213,7 @@ HWY_INLINE Counts gatheredBytes(const std::uint8_t* from, std::int32_t count, Co
     return hn::BitCast(di, hn::And(hn::Shr(bits, shift), hn::Set(du, 255u)));
 }
 
-/// Outline level between the pixels around those points.
+/// The outline level at points, interpolated between the four pixels around each.
 HWY_INLINE Points levelOf(const VotingSource& from, const SourcePoints& p, PointMask wanted,
                           const Window& window) {
     const PointTag d;
@@ -251,7 +253,7 @@ HWY_INLINE bool isSolidAround(const std::uint8_t* levels, int width, int column,
     return !((static_cast<float>(largest) - kLevelZero) * kLevelStep < kSolidAlpha);
 }
 
-/// isBackground() of those points, whose level is given.
+/// isBackground() of the `wanted` points, whose outline level is given.
 HWY_INLINE PointMask areBackground(shared::Votes& votes, const VotingSource& from, int s,
                                    const SourcePoints& p, Points level, PointMask wanted) {
     const PointTag d;
@@ -283,10 +285,10 @@ HWY_INLINE PointMask areBackground(shared::Votes& votes, const VotingSource& fro
     return maskOf(background);
 }
 
-/// Which points of `asked` can get no vote from a source, as one of its pixels already tells: the
-/// upper left one of the four around the point. Its depth, and how depth changes beside it, are
-/// compared with the point's. `qAt(x, y, lanes)` and `infoAt(x, y, lanes)` read the pixel that is
-/// (x, y) beside that one.
+/// Which points of `asked` get no vote from a source for sure, by one of its pixels alone: the
+/// upper left of the four around the point. The depth of that pixel, and how depth changes beside
+/// it, are compared with the point's. `qAt(x, y, lanes)` and `infoAt(x, y, lanes)` read the pixel
+/// that lies (x, y) pixels from it.
 template <class Depths, class Infos>
 HWY_INLINE PointMask withoutVote(const VotingSource& from, const SourcePoints& p, const Depths& qAt,
                                  const Infos& infoAt, Counts info, float clearlyBehind,
@@ -335,7 +337,7 @@ HWY_INLINE PointMask withoutVote(const VotingSource& from, const SourcePoints& p
     return hn::Or(hidden, hn::And(left, hn::Lt(p.q, least)));
 }
 
-/// `cast`, but for the points of `wanted` voteOne(lane, x, y, q).
+/// The votes `cast`, in which those of the `wanted` points are replaced by voteOne(lane, x, y, q).
 template <class VoteOne>
 HWY_INLINE Counts withVotes(Counts cast, Points x, Points y, Points q, PointMask wanted,
                             const VoteOne& voteOne) {
@@ -354,8 +356,8 @@ HWY_INLINE Counts withVotes(Counts cast, Points x, Points y, Points q, PointMask
     return hn::Load(di, vote);
 }
 
-/// voteAt() of source `s` on the points of `wanted`, 0 on others; of `outline`, those that have
-/// none near are taken out.
+/// voteAt() of source `s` on the points of `wanted`, 0 on others. Points that have no outline of
+/// the source near them are taken out of `outline`.
 HWY_INLINE Counts votesAt(shared::Votes& votes, const VotingSource& from, int s,
                           const FramePoints& points, PointMask wanted, PointMask& outline) {
     const PointTag d;
@@ -439,7 +441,7 @@ HWY_INLINE Counts votesAt(shared::Votes& votes, const VotingSource& from, int s,
     });
 }
 
-/// The facets of points, as far as they were asked for.
+/// The facets of points. Each is found when it is first asked for.
 struct Facets {
     const std::int32_t* owners;  ///< who shows each
     std::uint32_t known = 0;     ///< lanes

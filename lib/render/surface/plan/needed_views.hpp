@@ -10,14 +10,15 @@
 
 namespace stx::surface {
 
-/// Whether such a view, by its header, has a summary that tells what pictures hang on: not of
-/// captured, pruned, background and orthographic ones.
+/// Whether a view with this header has a summary that says all that pictures need to know of a view
+/// which they do not show. Captured, pruned, background and orthographic views have none.
 [[nodiscard]] bool tellsWithoutPixels(const ReferenceView& view);
 
-/// Of each view whether it may have a part in one of some pictures: it sees some of what they may
-/// show. The others draw nothing there, tell nothing of it, and no choice among views hangs on
-/// them but by their cameras and summaries (`summaries`: one for each view). All, where one of
-/// these does not tell, and of translucent views and several with one camera.
+/// Of each view whether some of the pictures may need its pixels: it sees some of what they may
+/// show. Of the others nothing is drawn there, they say nothing of it, and where views are chosen
+/// their cameras and summaries are enough (`summaries`: one for each view). All views are needed
+/// where a summary does not say enough, where views are translucent, and where several have one
+/// camera.
 [[nodiscard]] std::vector<bool> neededViews(const std::vector<ReferenceView>& views,
                                             std::span<const ViewSummary> summaries,
                                             const RenderSettings& settings,

@@ -17,11 +17,12 @@ constexpr double kFacingRounding = 1e-3;
 /// A block that is in part behind the camera is cut off at this share of its largest w.
 constexpr float kNearestShare = 1e-4f;
 
-/// Whether all that is drawn of a block is seen from behind. `eye`: that of the frame in the space
-/// of the source's pixels, homogeneous.
+/// Whether the frame's camera sees all that is drawn of a block from behind. `eye` is where that
+/// camera is, in the space of the source's pixels, homogeneous.
 bool isTurnedAway(const Source& s, const BlockRange& block, int x, int y, const glm::dvec4& eye) {
-    // A plane q = q0 + gx (x - x0) + gy (y - y0) faces the eye where
-    // gx (x - x0) + gy (y - y0) < q - q0 there; each term by its range over the block.
+    // The eye is in front of a plane q = q0 + gx (x - x0) + gy (y - y0) where
+    // gx (x - x0) + gy (y - y0) < q - q0, with the eye as (x, y, q). Over the block each term has a
+    // range.
     struct Range {
         double low, high;
         [[nodiscard]] double size() const { return std::max(std::abs(low), std::abs(high)); }
@@ -45,8 +46,8 @@ bool isTurnedAway(const Source& s, const BlockRange& block, int x, int y, const 
            kFacingRounding * (ofX.size() + ofY.size() + depth.size());
 }
 
-/// The corners of the room that blocks are drawn in, as a frame has them; side by side, so that
-/// compilers make vectors of it.
+/// The eight corners of the box around what is drawn of a block, in the frame. Arrays of each
+/// coordinate, so that compilers make vectors of the loops.
 struct Corners {
     std::array<float, 8> x, y, w;  ///< homogeneous
     struct DrawnBounds {
@@ -60,7 +61,7 @@ struct Corners {
         }
     };
 
-    /// The corners of the room of `side` x `side` pixels whose first is (left, top).
+    /// Of the box of `side` x `side` pixels from (left, top) on, between two depths.
     Corners(const Warp& warp, float left, float top, float side, float qNear, float qFar) {
         const auto& m = warp.m;
         for (std::size_t k = 0; k < 8; ++k) {
@@ -83,8 +84,8 @@ struct Corners {
         const auto [y0, y1] = std::ranges::minmax(v);
         return {x0, y0, x1, y1};
     }
-    /// The box of the part that is in front of the camera: edges that go behind it are cut off
-    /// where their depth is `cut`.
+    /// The box around the part that is in front of the camera. Edges that go on behind the camera
+    /// end where their w is `cut`.
     [[nodiscard]] DrawnBounds inFront(float cut) const {
         DrawnBounds box;
         for (std::size_t k = 0; k < 8; ++k) {
@@ -117,7 +118,8 @@ struct Placer {
         TileRange tiles;
         bool partlyBehind;
     };
-    /// Where `side` x `side` pixels from (x, y) on are; nothing where they are not in the frame.
+    /// The tiles that `side` x `side` pixels from (x, y) on may be drawn in; nothing where they are
+    /// not in the frame.
     [[nodiscard]] std::optional<Placed> place(const BlockRange& range, int x, int y,
                                               int side) const {
         const float margin = kBlockMargin * range.reach +
@@ -143,8 +145,8 @@ struct Placer {
     }
 };
 
-/// The middle of the block whose first pixel is (x, y) in the frame, homogeneous; where that is
-/// behind the camera, its corner that is farthest in front.
+/// The place in the frame, homogeneous, of the middle of the block whose first pixel is (x, y);
+/// where that is behind the camera, of the block's corner that is farthest in front of it.
 glm::dvec4 middleOrFarthest(const glm::dmat4& pixelFromSource, const BlockRange& block, int x,
                             int y) {
     const auto at = [&](double i, double j, double q) {

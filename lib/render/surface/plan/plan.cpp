@@ -42,8 +42,8 @@ std::vector<double> middlesOf(const SurfaceFrame& frame,
     return middles;
 }
 
-/// Chooses the `wanted` sources that a tile is built from, where more fall in it than it can take.
-/// `q` is the mean depth of what falls in it (middlesOf()).
+/// Chooses `wanted` of the sources that have blocks in a tile. `q` is the mean depth of these
+/// blocks (middlesOf()).
 std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q, int wanted) {
     const glm::dvec4 h =
         frame.space.worldFromPixel *
@@ -53,14 +53,14 @@ std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q, in
         return c.orthographic ? c.forward() : glm::normalize(point - c.position);
     };
     const glm::dvec3 look = towards(frame.space.camera);
-    // A camera may stand right where the view is drawn from and look elsewhere.
+    // A source may have been taken from where the frame is seen from, and have looked elsewhere.
     const auto inPicture = [&](const Source& s) {
         const glm::dvec4 at = s.space.pixelFromWorld * glm::dvec4(point, 1.0);
         return at.w > 0 && at.x >= 0 && at.y >= 0 && at.x <= at.w * s.width &&
                at.y <= at.w * s.height;
     };
-    // Sources by the angle between their line of sight and the novel one, the least first. Those
-    // that show nothing in the tile are put off until all others are taken.
+    // Sources in order of the angle between their line of sight and the novel one. Those that show
+    // nothing in the tile come after all others.
     using Ranked = std::pair<double, int>;
     std::vector<Ranked> left, idle;
     left.reserve(frame.sources.size());
@@ -88,7 +88,8 @@ std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q, in
     return chosen;
 }
 
-/// Adds, behind a tile's sources, those by which it is built a second time.
+/// Adds further sources to those of a tile: it is built once more from all of them, and the mean of
+/// both is shown (the stage `mean`).
 void addFurtherSources(SurfaceFrame& frame, int tile, double q) {
     std::vector<int>& sources = frame.tileSources[static_cast<std::size_t>(tile)];
     const auto core = static_cast<std::ptrdiff_t>(sources.size());
@@ -108,9 +109,9 @@ FrameSource sourceIn(const PixelSpace& space, const Source& s) {
     return f;
 }
 
-/// All sources, those that look at the middle of the scene most as the camera does first: where two
-/// are as good as each other, the one that shows more of what the camera sees is taken, and no
-/// picture hangs on the order or the pose of the views in their file.
+/// All sources, in order of the angle under which they and the camera see the middle of the scene.
+/// In this order ties are decided later: so the source that shows more of what the camera sees
+/// wins, and the picture does not depend on the order of the views in their file.
 std::vector<const Source*> sourcesBySide(const SurfaceScene& scene, const Bounds& bounds,
                                          const Camera& camera) {
     std::vector<const Source*> out;
@@ -156,12 +157,12 @@ Ray rayFrom(const PixelSpace& eye, const PixelSpace& frame) {
     return ray;
 }
 
-/// Of views that disagree (SurfaceScene::blends). Colours that lie beside each other are blurred as
-/// much as they must be, and no view is left out for an edge of its own: the colours of one view
-/// here and another there are a patchwork. The kitchen of 7-Scenes (two pictures) and open3d-rgbd,
-/// dB of Y: as of exact views 27.27, 25.61 and 37.36; edges in full 27.45, 25.76 and 37.55; kernels
-/// and ridges of 4.5 and 0.03 27.81, 25.94 and 37.61; 5 and 0.1 27.90, 25.99 and 37.46; 8 and 1
-/// 28.05, 26.07 and 36.56.
+/// Settings for views that disagree (SurfaceScene::blends): kernels are wider, so that colours that
+/// do not match are blurred into each other, and pixels at edges weigh in full, since colours of
+/// one view here and of another there are a patchwork. The kitchen of 7-Scenes (two pictures) and
+/// open3d-rgbd, dB of Y: as of exact views 27.27, 25.61 and 37.36; edges in full 27.45, 25.76
+/// and 37.55; kernels and ridges of 4.5 and 0.03 27.81, 25.94 and 37.61; 5 and 0.1 27.90, 25.99
+/// and 37.46; 8 and 1 28.05, 26.07 and 36.56.
 constexpr ShadeSettings kBlended{.kernel = 4.5f, .ridge = 0.03f, .edgeWeight = 1.0f};
 
 Effort effortOf(const RenderSettings& settings, const SurfaceScene& scene) {
@@ -169,21 +170,21 @@ Effort effortOf(const RenderSettings& settings, const SurfaceScene& scene) {
     e.places = settings.does(Stage::places);
     e.mean = settings.does(Stage::mean);
     e.settle = settings.does(Stage::settle);
-    // More look from so far aside that they take as much away as they add (pictures.md).
+    // More than 8 would look from so far aside that they cost as much as they add (pictures.md).
     if (settings.quality == Quality::best) e.moreGeometry = 8;
     if (scene.blends) e.shade = kBlended;
     double valid = 0;
     for (const Source& s : scene.sources)
         valid += s.validShare / static_cast<double>(scene.sources.size());
-    // Pruned views share the surface among them: each may be the only one left to show a piece of
-    // it. Of views with gaps as many are needed as together show what the usual number would.
+    // Each pruned view may be the only one left that shows some piece of the surface, so that all
+    // are needed. Of views with gaps (validShare below 1), as many more are taken as the gaps cost.
     if (scene.set.pruned()) {
         e.mostGeometry = kMostTileSources;
         e.moreGeometry = 0;
         e.freeLevel = kFreeLevelPruned;
         e.preferShown = true;
     } else if (valid < 1 && !(scene.set.farAway() > 0)) {
-        // Rounding, or a pixel in a million, does not ask for another source.
+        // A pixel in a million that is missing, or rounding, must not add a source.
         constexpr double kNothing = 1e-5;
         for (int* most : {&e.mostGeometry, &e.moreGeometry})
             *most = static_cast<int>(
