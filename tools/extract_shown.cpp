@@ -42,7 +42,7 @@ Result<Shown> writePage(const std::string& input, const OpenOptions& open,
         page = writeViewerPage(atlas, output, write, program.job);
     } else {
         STX_TRY(auto frames, openSequence(input, open, program.job));
-        STX_TRY(frames, refined(std::move(frames), refine, peak::kPage));
+        STX_TRY(frames, refined(std::move(frames), refine, peak::kPage, folderBeside(output)));
         page = writeViewerPage(*frames, output, write, program.job);
     }
     if (!page) return propagate(page);
@@ -157,7 +157,7 @@ Result<int> extractPicture(const std::string& input, const OpenOptions& open,
     const Stopwatch watch;
     if (kind == DepthPicture::pair) STX_CHECK(checkTarget(depthFileOf(output), program));
     STX_TRY(auto frames, openSequence(input, open, program.job));
-    STX_TRY(frames, refined(std::move(frames), refine, peak::kExport));
+    STX_TRY(frames, refined(std::move(frames), refine, peak::kExport, folderBeside(output)));
     STX_TRY(const auto moment,
             momentOf(time, frames->timeline(), "a picture is", input, program.job));
     STX_TRY(const auto table, frames->views(moment, program.job));

@@ -51,7 +51,8 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
     const Stopwatch watch;
     STX_TRY(auto frames, openSequence(input, open, program.job));
     STX_TRY(frames, refined(std::move(frames), refine,
-                            settings.most > 0 ? peak::kFewerSplats : peak::kSplats));
+                            settings.most > 0 ? peak::kFewerSplats : peak::kSplats,
+                            folderBeside(output)));
     const Timeline timeline = frames->timeline();
     const bool numbered = frameName(output, 0).has_value();
     std::size_t first = 0, end = timeline.count();

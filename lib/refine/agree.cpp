@@ -79,11 +79,14 @@ std::pair<Image<float>, float> moved(std::span<const NoisyView> views, std::size
 
 }  // namespace
 
-void agreeOnDepth(std::span<NoisyView> views) {
+void agreeOnDepth(std::span<NoisyView> views, PixelSpool* spool) {
     if (views.size() < 2) return;
     for (int round = 0; round < kAgreementRounds; ++round) {
         std::vector<std::pair<Image<float>, float>> results;
-        for (std::size_t i = 0; i < views.size(); ++i) results.push_back(moved(views, i));
+        for (std::size_t i = 0; i < views.size(); ++i) {
+            results.push_back(moved(views, i));
+            results.back().first.moveTo(spool);
+        }
         for (std::size_t i = 0; i < views.size(); ++i) {
             *views[i].q = std::move(results[i].first);
             views[i].left = kUnconfirmed * results[i].second;

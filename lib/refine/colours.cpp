@@ -146,14 +146,19 @@ Image<float> matched(std::span<const NoisyView> views, std::span<const Image<flo
 
 }  // namespace
 
-void agreeOnColours(std::span<const NoisyView> views) {
+void agreeOnColours(std::span<const NoisyView> views, PixelSpool* spool) {
     if (views.size() < 2) return;
     std::vector<Image<float>> lightness;
-    for (const NoisyView& view : views) lightness.push_back(lightnessOf(view));
+    for (const NoisyView& view : views) {
+        lightness.push_back(lightnessOf(view));
+        lightness.back().moveTo(spool);
+    }
     for (int round = 0; round < kColourRounds; ++round) {
         std::vector<Image<float>> results;
-        for (std::size_t i = 0; i < views.size(); ++i)
+        for (std::size_t i = 0; i < views.size(); ++i) {
             results.push_back(matched(views, lightness, i));
+            results.back().moveTo(spool);
+        }
         for (std::size_t i = 0; i < views.size(); ++i) *views[i].q = std::move(results[i]);
     }
 }

@@ -103,15 +103,18 @@ Image<float> kept(std::span<const NoisyView> views, const std::vector<bool>& say
 
 }  // namespace
 
-void keepInSilhouettes(std::span<const NoisyView> views, const SilhouetteAlpha& alpha) {
+void keepInSilhouettes(std::span<const NoisyView> views, const SilhouetteAlpha& alpha,
+                       PixelSpool* spool) {
     std::vector<bool> saysAnything;
     for (const NoisyView& view : views)
         saysAnything.push_back(hasBackground(*view.texture, alpha.free));
     if (std::none_of(saysAnything.begin(), saysAnything.end(), [](bool says) { return says; }))
         return;
     std::vector<Image<float>> results;
-    for (std::size_t i = 0; i < views.size(); ++i)
+    for (std::size_t i = 0; i < views.size(); ++i) {
         results.push_back(kept(views, saysAnything, i, alpha));
+        results.back().moveTo(spool);
+    }
     for (std::size_t i = 0; i < views.size(); ++i) *views[i].q = std::move(results[i]);
 }
 

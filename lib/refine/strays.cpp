@@ -89,9 +89,12 @@ Image<std::uint8_t> straysOf(std::span<const NoisyView> views, std::size_t numbe
 
 }  // namespace
 
-std::int64_t removeStrays(std::span<const NoisyView> views) {
+std::int64_t removeStrays(std::span<const NoisyView> views, PixelSpool* spool) {
     std::vector<Image<std::uint8_t>> strays;
-    for (std::size_t i = 0; i < views.size(); ++i) strays.push_back(straysOf(views, i));
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        strays.push_back(straysOf(views, i));
+        strays.back().moveTo(spool);
+    }
     std::int64_t removed = 0;
     for (std::size_t i = 0; i < views.size(); ++i) {
         for (std::size_t k = 0; k < strays[i].count(); ++k) {
