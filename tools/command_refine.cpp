@@ -6,6 +6,7 @@
 #include "formats/any/open.hpp"
 #include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
+#include "formats/files/numbered.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/stopwatch.hpp"
 #include "lib/refine/poses.hpp"
@@ -58,8 +59,8 @@ Result<void> noteDisagreement(const ViewTable& table, const RefineSettings& sett
     return {};
 }
 
-/// The views of one moment, refined. Those that are exact are read one by one, and so are those that
-/// take less memory in a spool.
+/// The views of one moment, refined. Those that are exact are read one by one, and so are those
+/// that take less memory in a spool.
 Result<std::unique_ptr<ViewTable>> refinedStill(std::unique_ptr<ViewTable> table,
                                                 const RefineOptions& o, Refining& refining,
                                                 Job& job) {
@@ -110,7 +111,7 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
     };
     SaveOptions save;
     save.noClobber = program.common.noClobber;
-    if (timeline.count() == 1 && !holdsSequences(o.output)) {
+    if (timeline.count() == 1 && !frameName(o.output, 0)) {
         STX_TRY(auto table, frames->views(0, program.job));
         frames.reset();
         lookAt(std::as_const(*table).about());
@@ -118,14 +119,14 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
         STX_CHECK(saveStill(*table, o, save, program.job));
     } else {
         bool first = true;
-        frames = changedOnTheWay(
-            std::move(frames), o.output, [&](Bundle& bundle, Job& job) -> Result<void> {
-                lookAt(bundle);
-                STX_CHECK(refining.refine(bundle, job));
-                // Of a film its first frame tells.
-                if (!std::exchange(first, false)) return {};
-                return noteDisagreement(*viewsOf(bundle), settings, job);
-            });
+        frames = changedOnTheWay(std::move(frames), o.output,
+                                 [&](Bundle& bundle, Job& job) -> Result<void> {
+                                     lookAt(bundle);
+                                     STX_CHECK(refining.refine(bundle, job));
+                                     // Of a film its first frame tells.
+                                     if (!std::exchange(first, false)) return {};
+                                     return noteDisagreement(*viewsOf(bundle), settings, job);
+                                 });
         STX_CHECK(saveSequence(*frames, o.output, save, program.job));
     }
     const RefineReport& report = refining.report();

@@ -43,14 +43,10 @@ Result<void> checkPeakOfAll(const PeakMemory& step, const ViewTable& views, cons
     return checkPeak(step, pixels, largest, held, limits);
 }
 
-/// The part of the memory limit that holds what is in use of a spool; see also render_scene.cpp.
-constexpr std::uint64_t kRefinedPart = 32;
-
 /// Whether refining takes less memory with the views in a spool. Small captures do not.
 bool takesLessInSpool(const ViewTable& views, const Limits& limits) {
-    return !views.whole() && memoryOfEach(views, peak::kRefine) +
-                                     limits.maxMemoryBytes / kRefinedPart <
-                                 memoryOfAll(views, peak::kRefine);
+    return !views.whole() &&
+           memoryFromSpool(views, peak::kRefine, limits) < memoryOfAll(views, peak::kRefine);
 }
 
 /// Errors (invalidInput) where refining one view beside a spool takes more than the limit.
@@ -62,13 +58,22 @@ Result<void> checkRoomBesideSpool(const ViewTable& views, const Limits& limits) 
         pixels += views.pixelsOf(i);
     }
     const std::uint64_t beside = views.bytesHeld() + most;
-    return checkPeak({peak::kRefine.what, 0}, pixels, 0, beside + beside / (kRefinedPart - 1),
+    return checkPeak({peak::kRefine.what, 0}, pixels, 0, beside + beside / (kSpoolPart - 1),
                      limits);
 }
 
 Result<RefineReport> refineIn(PixelSpool* spool, Bundle& bundle, const RefineSettings& settings,
                               Job& job) {
     return spool ? stx::refine(bundle, settings, *spool, job) : stx::refine(bundle, settings, job);
+}
+
+/// Refines, in a spool if it is not null; a note says what was done.
+Result<void> refineAsAsked(Bundle& bundle, const RefineSettings& settings, PixelSpool* spool,
+                           Job& job) {
+    if (!settings.any()) return {};
+    STX_TRY(const auto report, refineIn(spool, bundle, settings, job));
+    if (report.changed()) job.note("refined: " + report.text());
+    return {};
 }
 
 /// What refineViews() does, in a spool if it is not null.
@@ -139,6 +144,11 @@ Result<void> refineViews(Bundle& bundle, const RefineSettings& settings, const P
     return refineFor(then, settings, bundle, nullptr, job);
 }
 
+Result<void> refineViews(Bundle& bundle, const RefineSettings& settings, PixelSpool& spool,
+                         Job& job) {
+    return refineFor(peak::kRefine, settings, bundle, &spool, job);
+}
+
 Result<std::unique_ptr<Sequence>> refined(std::unique_ptr<Sequence> frames, const std::string& text,
                                           const PeakMemory& then,
                                           const std::filesystem::path& folder) {
@@ -173,7 +183,7 @@ Result<std::unique_ptr<ViewTable>> refinedViews(std::unique_ptr<ViewTable> table
         STX_CHECK(refine(bundle, nullptr, job));
         return tableOf(std::move(bundle));
     }
-    const std::uint64_t held = job.limits.maxMemoryBytes / kRefinedPart;
+    const std::uint64_t held = job.limits.maxMemoryBytes / kSpoolPart;
     STX_TRY(auto spool, FileSpool::create(folder, held));
     Job beside;  // what the spool takes is not there for others
     beside.workFor(job);
@@ -228,7 +238,7 @@ Result<RefineSettings> ImportRefining::settings() const {
     return settings;
 }
 
-Result<void> ImportRefining::refine(Bundle& bundle, bool imported, Job& job) const {
+Result<RefineSettings> ImportRefining::left(bool imported, Job& job) const {
     STX_TRY(RefineSettings settings, RefineSettings::from(steps));
     settings = settings.asked();
     for (const RefineStepInfo& info : refineSteps())
@@ -238,11 +248,24 @@ Result<void> ImportRefining::refine(Bundle& bundle, bool imported, Job& job) con
                 fmt::format("the step '{}' of refining is of image sets and was not done: the "
                             "input is none",
                             info.name));
-    if (imported) settings = settings.afterImport();
-    if (!settings.any()) return {};
-    STX_TRY(const auto report, stx::refine(bundle, settings, job));
-    if (report.changed()) job.note("refined: " + report.text());
-    return {};
+    return imported ? settings.afterImport() : settings;
+}
+
+Result<void> ImportRefining::refine(Bundle& bundle, bool imported, Job& job) const {
+    STX_TRY(const auto settings, left(imported, job));
+    return refineAsAsked(bundle, settings, nullptr, job);
+}
+
+Result<std::unique_ptr<ViewTable>> ImportRefining::refined(std::unique_ptr<ViewTable> table,
+                                                           bool imported,
+                                                           const std::filesystem::path& folder,
+                                                           Job& job) const {
+    STX_TRY(const auto settings, left(imported, job));
+    if (!settings.any()) return table;
+    const auto refine = [&](Bundle& bundle, PixelSpool* spool, Job& own) {
+        return refineAsAsked(bundle, settings, spool, own);
+    };
+    return refinedViews(std::move(table), settings, refine, false, folder, job);
 }
 
 void addImportRefining(Command& command, ImportRefining& refining, const char* sets) {

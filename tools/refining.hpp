@@ -25,10 +25,14 @@ Option refineOption(Command& command, std::string& text);
 [[nodiscard]] Result<void> refineViews(Bundle& bundle, const RefineSettings& settings,
                                        const PeakMemory& then, Job& job);
 
+/// The same of views in a spool, which must outlive the bundle.
+[[nodiscard]] Result<void> refineViews(Bundle& bundle, const RefineSettings& settings,
+                                       PixelSpool& spool, Job& job);
+
 /// Frames that are refined when they are read; a note says which steps were done. `text` is that of
 /// the option. `then` is what they are for: errors (invalidInput) where they are too large for it.
-/// `folder`: for what memory does not hold. Views that are asked for one by one are in a spool there
-/// where that takes less (refinedViews()).
+/// `folder`: for what memory does not hold. Views that are asked for one by one are in a spool
+/// there where that takes less (refinedViews()).
 [[nodiscard]] Result<std::unique_ptr<Sequence>> refined(std::unique_ptr<Sequence> frames,
                                                         const std::string& text,
                                                         const PeakMemory& then,
@@ -45,12 +49,9 @@ using RefineBundle = std::function<Result<void>(Bundle& bundle, PixelSpool* spoo
 /// memory, or from a spool in a folder where that takes less memory. What `refine` takes in memory,
 /// and what follows, it checks itself. `looksFirst`: whether mayRefine() is asked of views that
 /// memory holds, too.
-[[nodiscard]] Result<std::unique_ptr<ViewTable>> refinedViews(std::unique_ptr<ViewTable> table,
-                                                              const RefineSettings& settings,
-                                                              const RefineBundle& refine,
-                                                              bool looksFirst,
-                                                              const std::filesystem::path& folder,
-                                                              Job& job);
+[[nodiscard]] Result<std::unique_ptr<ViewTable>> refinedViews(
+    std::unique_ptr<ViewTable> table, const RefineSettings& settings, const RefineBundle& refine,
+    bool looksFirst, const std::filesystem::path& folder, Job& job);
 
 /// The folder of an output, for what is kept beside memory; of standard output that of temporary
 /// files.
@@ -99,9 +100,16 @@ struct ImportRefining {
 
     /// What an import is to do. Errors (usage): a name that is none.
     [[nodiscard]] Result<RefineSettings> settings() const;
-    /// Does the steps that --refine names of a bundle that is there; nothing is done by itself.
-    /// Notes say what was done, and which steps cannot be of what was not `imported` now.
+    /// The steps that --refine names of a bundle that is there; none are done by themselves. Notes
+    /// say which cannot be of what was not `imported` now.
+    [[nodiscard]] Result<RefineSettings> left(bool imported, Job& job) const;
+    /// Does them. Notes say what was done.
     Result<void> refine(Bundle& bundle, bool imported, Job& job) const;
+    /// The same of one moment: refinedViews().
+    [[nodiscard]] Result<std::unique_ptr<ViewTable>> refined(std::unique_ptr<ViewTable> table,
+                                                             bool imported,
+                                                             const std::filesystem::path& folder,
+                                                             Job& job) const;
 };
 
 /// --refine, and the options of single steps under the heading of image sets. `refining` must

@@ -443,7 +443,8 @@ Result<void> addMeasured(const fs::path& path, FileKind kind, const InfoOptions&
     if (options.memory) {
         auto memory = [&]() -> Result<Json> {
             const bool onDemand = kind == FileKind::mpeg4 || out["container"] == "exr";
-            if (!onDemand) return memoryOfSizes(out["views"], setOnDemand(kind, out, job.limits));
+            if (!onDemand)
+                return memoryOfSizes(out["views"], setOnDemand(kind, out, job.limits), job.limits);
             STX_TRY(const auto table, openViews(path, open, job));
             return memoryJson(*table, job);
         }();

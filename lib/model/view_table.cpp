@@ -56,8 +56,8 @@ struct OwnSpool {
 /// Keeps the spool longer than the bundle, which ViewTable has.
 class SpooledViews : private OwnSpool, public ViewTable {
   public:
-    SpooledViews(std::vector<ViewImageKinds> kinds, Bundle bundle,
-                 std::unique_ptr<PixelSpool> in, std::uint64_t held)
+    SpooledViews(std::vector<ViewImageKinds> kinds, Bundle bundle, std::unique_ptr<PixelSpool> in,
+                 std::uint64_t held)
         : OwnSpool{std::move(in)}, ViewTable(std::move(bundle), std::move(kinds)), held_(held) {}
 
     std::uint64_t bytesHeld() const override { return held_; }
@@ -327,6 +327,19 @@ std::uint64_t memoryOfEach(const ViewTable& table, const PeakMemory& work) {
         most = std::max(most, memoryOfOne(table, i, work));
     return table.bytesHeld() +
            most * std::min<std::uint64_t>(mostAtOnce(table, work), table.count());
+}
+
+std::uint64_t memoryFromSpool(const ViewTable& table, const PeakMemory& work,
+                              const Limits& limits) {
+    std::uint64_t most = 1;
+    for (std::size_t i = 0; i < table.count(); ++i)
+        most = std::max(most, memoryOfOne(table, i, work));
+    const std::uint64_t limit = limits.maxMemoryBytes;
+    const std::uint64_t beside = table.bytesHeld() + limit / kSpoolPart;
+    const std::uint64_t room = limit > beside ? (limit - beside) / most : 0;
+    const auto count = std::max<std::uint64_t>(table.count(), 1);
+    return beside +
+           most * std::clamp<std::uint64_t>(room, 1, std::min(mostAtOnce(table, work), count));
 }
 
 std::uint64_t memoryOfAll(const ViewTable& table, const PeakMemory& work) {

@@ -146,6 +146,14 @@ struct ViewChange {
 [[nodiscard]] std::uint64_t memoryOfEach(const ViewTable& table, const PeakMemory& work);
 [[nodiscard]] std::uint64_t memoryOfAll(const ViewTable& table, const PeakMemory& work);
 
+/// The part of the memory limit that holds what is in use of a spool, where views are in one.
+/// Smaller parts save little: the rest is what work on a view takes.
+inline constexpr std::uint64_t kSpoolPart = 32;
+/// Memory of such work on as many views at a time as the limit has room for, beside such a spool
+/// with all of them, bytes. Above the limit: even one view is too large.
+[[nodiscard]] std::uint64_t memoryFromSpool(const ViewTable& table, const PeakMemory& work,
+                                            const Limits& limits);
+
 /// Goes through all views, in rounds of as many at a time as there are threads and as the memory
 /// limit has room for (one where PeakMemory::oneByOneFrom says so): `each` is called with a view
 /// from several threads, then `inOrder`, if any, for the views of the round one after the other, in

@@ -228,17 +228,6 @@ std::string RefineReport::text() const {
 
 namespace {
 
-/// The room of a spool. Errors (invalidInput): the largest view alone takes more than the limit.
-Result<RefineRoom> roomIn(PixelSpool& spool, const Bundle& bundle, const Limits& limits) {
-    std::uint64_t largest = 1;
-    for (const ReferenceView& view : bundle.views)
-        largest = std::max(largest, static_cast<std::uint64_t>(view.camera.width) *
-                                        static_cast<std::uint64_t>(view.camera.height));
-    STX_CHECK(checkPeak(peak::kRefine, largest, largest, 0, limits));
-    const std::uint64_t most = limits.maxMemoryBytes / (peak::kRefine.perPixel * largest);
-    return RefineRoom{&spool, static_cast<std::int64_t>(std::min<std::uint64_t>(most, 1 << 20))};
-}
-
 Result<RefineReport> refineIn(const RefineRoom& room, Bundle& bundle,
                               const RefineSettings& settings, Job& job) {
     RefineReport report, ofAll;
@@ -287,7 +276,10 @@ Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings, Job&
 Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings, PixelSpool& spool,
                             Job& job) {
     STX_CHECK(bundle.check());
-    STX_TRY(const RefineRoom room, roomIn(spool, bundle, job.limits));
+    std::uint64_t largest = 0;
+    for (const ReferenceView& view : bundle.views)
+        largest = std::max<std::uint64_t>(largest, view.depth.count());
+    STX_TRY(const RefineRoom room, roomIn(spool, largest, job.limits));
     return refineIn(room, bundle, settings, job);
 }
 

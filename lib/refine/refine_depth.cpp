@@ -10,6 +10,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
 #include "lib/geometry/pixel_space.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/refine/agree.hpp"
 #include "lib/refine/align.hpp"
 #include "lib/refine/colours.hpp"
@@ -463,6 +464,13 @@ void RefinedView::giveTo(ViewHeader& view) const {
         view.nearPlane = std::min(view.nearPlane, static_cast<double>(dist));
         view.farPlane = std::max(view.farPlane, static_cast<double>(dist));
     }
+}
+
+Result<RefineRoom> roomIn(PixelSpool& spool, std::uint64_t largest, const Limits& limits) {
+    STX_CHECK(checkPeak(peak::kRefine, largest, largest, 0, limits));
+    const std::uint64_t views =
+        limits.maxMemoryBytes / (peak::kRefine.perPixel * std::max<std::uint64_t>(largest, 1));
+    return RefineRoom{&spool, static_cast<std::int64_t>(std::min<std::uint64_t>(views, 1 << 20))};
 }
 
 std::vector<RefinedView> refineDepth(std::span<const RefineView> views,

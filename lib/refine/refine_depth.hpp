@@ -38,6 +38,11 @@ struct RefineRoom {
     std::int64_t atOnce = 0;      ///< 0: any number
 };
 
+/// The room of a spool, for views of which the largest has so many pixels. Errors (invalidInput):
+/// that one alone takes more than the limit.
+[[nodiscard]] Result<RefineRoom> roomIn(PixelSpool& spool, std::uint64_t largest,
+                                        const Limits& limits);
+
 /// Refines the depth of views of one moment, unless one of them was refined before: see
 /// RefineSettings::after(). The same on any number of threads, and in any room.
 [[nodiscard]] std::vector<RefinedView> refineDepth(std::span<const RefineView> views,

@@ -56,7 +56,8 @@ bool PageSet::mayRefine(const RefineSettings& settings) const {
     return needs.any();
 }
 
-PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) const {
+PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report,
+                         std::int64_t atOnce) const {
     RefineReport own;
     RefineReport& found = report ? *report : own;
     found = {};
@@ -72,7 +73,7 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) c
         const auto number = static_cast<std::size_t>(i);
         given[number] = viewImages(*this, number, copies[number]);
     });
-    auto better = refineDepth(given, left, found);
+    auto better = refineDepth(given, left, found, {spool(), atOnce});
     if (!found.changed()) return *this;
     auto data = std::make_shared<Data>(*data_);
     std::vector<std::shared_ptr<Image<float>>> depths(data->pages.size());
