@@ -50,9 +50,9 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
                           Program& program) {
     const Stopwatch watch;
     STX_TRY(auto frames, openSequence(input, open, program.job));
-    STX_TRY(frames, refined(std::move(frames), refine,
-                            settings.most > 0 ? peak::kFewerSplats : peak::kSplats,
-                            folderBeside(output)));
+    STX_TRY(frames,
+            refined(std::move(frames), refine,
+                    settings.most > 0 ? peak::kFewerSplats : peak::kSplats, folderBeside(output)));
     const Timeline timeline = frames->timeline();
     const bool numbered = frameName(output, 0).has_value();
     std::size_t first = 0, end = timeline.count();

@@ -16,9 +16,46 @@ namespace {
 constexpr float kFarthestDoubts = 6.0f;
 constexpr int kPlaces = 16;
 
+/// What a view shows between the middles of four pixels, (x, y) being the last of them.
+enum class Shown : std::uint8_t {
+    object,      ///< of all four alpha is above `free`
+    background,  ///< of all four it is 0
+    outline
+};
+using ShownMap = Image<Shown>;
+
+/// Alpha as far above `free` is above it between pixels, too, whatever rounding does.
+constexpr float kRounding = 1e-4f;
+
+/// One column and row more than the view has.
+ShownMap shownBy(const Texture& texture, float freeLevel) {
+    const int width = texture.width(), height = texture.height();
+    const auto kindOf = [&](int x, int y) {
+        const float a = texture.alpha(static_cast<std::size_t>(y) * width + x);
+        return a >= freeLevel + kRounding ? Shown::object
+               : a > 0.0f                 ? Shown::outline
+                                          : Shown::background;
+    };
+    ShownMap out(width + 1, height + 1);
+    parallelForBlocks(0, out.height(), 32, [&](std::int64_t first, std::int64_t last) {
+        for (int y = static_cast<int>(first); y < last; ++y) {
+            const int above = std::max(y - 1, 0), below = std::min(y, height - 1);
+            for (int x = 0; x <= width; ++x) {
+                const int left = std::max(x - 1, 0), right = std::min(x, width - 1);
+                const Shown a = kindOf(left, above);
+                const bool alike = a == kindOf(right, above) && a == kindOf(left, below) &&
+                                   a == kindOf(right, below);
+                out.at(x, y) = alike ? a : Shown::outline;
+            }
+        }
+    });
+    return out;
+}
+
 /// A view that may see background at a point.
 struct Witness {
     const Texture* texture;
+    const ShownMap* shown;
     int width, height;
     Warp warp;  ///< from the pixels of the view that is looked at
     SilhouetteAlpha level;
@@ -38,8 +75,10 @@ struct Witness {
               v < static_cast<float>(height)))
             return false;
         const float fu = std::floor(u - 0.5f), fv = std::floor(v - 0.5f);
-        const float tx = u - 0.5f - fu, ty = v - 0.5f - fv;
         const int px = static_cast<int>(fu), py = static_cast<int>(fv);
+        const Shown kind = shown->at(px + 1, py + 1);
+        if (kind != Shown::outline) return kind == Shown::background;
+        const float tx = u - 0.5f - fu, ty = v - 0.5f - fv;
         const float a = (alpha(px, py) * (1 - tx) + alpha(px + 1, py) * tx) * (1 - ty) +
                         (alpha(px, py + 1) * (1 - tx) + alpha(px + 1, py + 1) * tx) * ty;
         if (!(a < level.free)) return false;
@@ -65,13 +104,14 @@ bool hasBackground(const Texture& texture, float freeLevel) {
     return false;
 }
 
-Image<float> kept(std::span<const NoisyView> views, const std::vector<bool>& saysAnything,
+/// `shown`: of each view; empty of those that say nothing.
+Image<float> kept(std::span<const NoisyView> views, std::span<const ShownMap> shown,
                   std::size_t number, const SilhouetteAlpha& alpha) {
     const NoisyView& view = views[number];
     std::vector<Witness> witnesses;
     for (std::size_t i = 0; i < views.size(); ++i) {
-        if (i == number || !saysAnything[i]) continue;
-        witnesses.push_back({views[i].texture, views[i].q->width(), views[i].q->height(),
+        if (i == number || shown[i].empty()) continue;
+        witnesses.push_back({views[i].texture, &shown[i], views[i].q->width(), views[i].q->height(),
                              warpFrom(views[i].space->pixelFromWorld * view.space->worldFromPixel),
                              alpha});
     }
@@ -105,14 +145,16 @@ Image<float> kept(std::span<const NoisyView> views, const std::vector<bool>& say
 
 void keepInSilhouettes(std::span<const NoisyView> views, const SilhouetteAlpha& alpha,
                        PixelSpool* spool) {
-    std::vector<bool> saysAnything;
-    for (const NoisyView& view : views)
-        saysAnything.push_back(hasBackground(*view.texture, alpha.free));
-    if (std::none_of(saysAnything.begin(), saysAnything.end(), [](bool says) { return says; }))
-        return;
+    std::vector<ShownMap> shown(views.size());
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        if (!hasBackground(*views[i].texture, alpha.free)) continue;
+        shown[i] = shownBy(*views[i].texture, alpha.free);
+        shown[i].moveTo(spool);
+    }
+    if (std::ranges::all_of(shown, &ShownMap::empty)) return;
     std::vector<Image<float>> results;
     for (std::size_t i = 0; i < views.size(); ++i) {
-        results.push_back(kept(views, saysAnything, i, alpha));
+        results.push_back(kept(views, shown, i, alpha));
         results.back().moveTo(spool);
     }
     for (std::size_t i = 0; i < views.size(); ++i) *views[i].q = std::move(results[i]);

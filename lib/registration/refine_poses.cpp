@@ -172,8 +172,8 @@ double step(Bundle& bundle, const std::vector<Pyramid>& greys, const std::vector
 
 }  // namespace
 
-Result<PoseRefinement> refinePoses(Bundle& bundle, const PoseRefinementSettings& settings,
-                                   Job& job, PixelSpool* spool) {
+Result<PoseRefinement> refinePoses(Bundle& bundle, const PoseRefinementSettings& settings, Job& job,
+                                   PixelSpool* spool) {
     PoseRefinement result;
     const auto views = depthViewsOf(bundle);
     const auto pairs = overlappingPairs(views, settings);

@@ -1,5 +1,5 @@
-// Refining in a spool: the same bytes as in memory, whatever is wrong with the views, and nothing of
-// all views stays in memory.
+// Refining in a spool: the same bytes as in memory, whatever is wrong with the views, and nothing
+// of all views stays in memory.
 #include <gtest/gtest.h>
 
 #include <atomic>
