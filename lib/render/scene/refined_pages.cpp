@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <atomic>
 
 #include "lib/base/parallel.hpp"
 #include "lib/refine/refine_depth.hpp"
@@ -40,10 +41,13 @@ bool PageSet::mayRefine(const RefineSettings& settings) const {
     for (const PageView& view : views()) left = left.after(view.refined);
     if (!left.any()) return false;
     std::vector<RefineNeeds> ofViews(views().size(), RefineNeeds(left));
+    std::atomic<bool> enough = false;  // some view tells for all
     const auto look = [&](std::size_t i) {
+        if (enough) return;
         settle();
         ReferenceView copy;
         ofViews[i].add(viewImages(*this, i, copy));
+        if (ofViews[i].surely()) enough = true;
     };
     // Views in rectangles are copied; one at a time, since a copy takes the memory of a whole view.
     if (views().front().whole)

@@ -72,6 +72,7 @@ RefineReport expectSameInSpool(const Bundle& bundle, const RefineSettings& setti
         Job own;
         if (little) own.limits.maxMemoryBytes = 40 * first.depth.count();
         CountedSpool spool;
+        std::size_t images = 0, pixels = 0;
         {
             Bundle inSpool = bundle;
             for (ReferenceView& view : inSpool.views) view.moveTo(&spool);
@@ -82,16 +83,18 @@ RefineReport expectSameInSpool(const Bundle& bundle, const RefineSettings& setti
             EXPECT_EQ(report->noise, expected->noise);
             EXPECT_EQ(report->ownColour, expected->ownColour);
             expectSame(inMemory, inSpool, what);
-            std::size_t images = 0;
-            for (const ReferenceView& view : inSpool.views)
+            for (const ReferenceView& view : inSpool.views) {
+                pixels += view.depth.count();
                 images += view.depth.count() * ViewImageKinds::of(view).bytesPerPixel();
+            }
             EXPECT_EQ(spool.taken(), images) << what << ": the images, and nothing else, stay";
         }
         EXPECT_EQ(spool.taken(), 0u);
-        const bool changed = expected->of(RefineStep::noise).views > 0;
-        // What is known of each pixel of noisy views: q, its surface, and q before a step.
-        EXPECT_GE(spool.most(), (changed ? 28 : 12) * first.depth.count() * bundle.views.size())
-            << what;
+        // What is known of each pixel: q; of noisy views its surface, q before a step and after it,
+        // and how light it is.
+        EXPECT_LE(spool.most(), images + 28 * pixels) << what;
+        const bool noisy = expected->of(RefineStep::noise).views > 0;
+        EXPECT_GE(spool.most(), images + (noisy ? 12 : 4) * pixels) << what;
     }
     return *expected;
 }
