@@ -106,7 +106,7 @@ bool hasBackground(const Texture& texture, float freeLevel) {
 
 /// `shown`: of each view; empty of those that say nothing.
 Image<float> kept(std::span<const NoisyView> views, std::span<const ShownMap> shown,
-                  std::size_t number, const SilhouetteAlpha& alpha) {
+                  std::size_t number, const SilhouetteAlpha& alpha, PixelSpool* spool) {
     const NoisyView& view = views[number];
     std::vector<Witness> witnesses;
     for (std::size_t i = 0; i < views.size(); ++i) {
@@ -116,26 +116,24 @@ Image<float> kept(std::span<const NoisyView> views, std::span<const ShownMap> sh
                              alpha});
     }
     Image<float> out = *view.q;
-    parallelForBlocks(0, out.height(), 16, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y) {
-            for (int x = 0; x < out.width(); ++x) {
-                const float q = view.q->at(x, y), doubt = view.surface.at(x, y).z;
-                if (!(q > 0.0f) || !(doubt > 0.0f)) continue;
-                const float u = static_cast<float>(x) + 0.5f, v = static_cast<float>(y) + 0.5f;
-                int fewest = countOf(witnesses, u, v, q);
-                float best = q;
-                for (int k = 1; k <= 2 * kPlaces && fewest > 0; ++k) {
-                    const auto steps = static_cast<float>((k + 1) / 2);
-                    const float there =
-                        q + (k % 2 ? -1.0f : 1.0f) * steps * (kFarthestDoubts / kPlaces) * doubt;
-                    if (!(there > 0.0f)) continue;
-                    const int count = countOf(witnesses, u, v, there);
-                    if (count >= fewest) continue;
-                    fewest = count;
-                    best = there;
-                }
-                out.at(x, y) = best;
+    forRows(out, spool, [&](int y) {
+        for (int x = 0; x < out.width(); ++x) {
+            const float q = view.q->at(x, y), doubt = view.surface.at(x, y).z;
+            if (!(q > 0.0f) || !(doubt > 0.0f)) continue;
+            const float u = static_cast<float>(x) + 0.5f, v = static_cast<float>(y) + 0.5f;
+            int fewest = countOf(witnesses, u, v, q);
+            float best = q;
+            for (int k = 1; k <= 2 * kPlaces && fewest > 0; ++k) {
+                const auto steps = static_cast<float>((k + 1) / 2);
+                const float there =
+                    q + (k % 2 ? -1.0f : 1.0f) * steps * (kFarthestDoubts / kPlaces) * doubt;
+                if (!(there > 0.0f)) continue;
+                const int count = countOf(witnesses, u, v, there);
+                if (count >= fewest) continue;
+                fewest = count;
+                best = there;
             }
+            out.at(x, y) = best;
         }
     });
     return out;
@@ -154,7 +152,7 @@ void keepInSilhouettes(std::span<const NoisyView> views, const SilhouetteAlpha& 
     if (std::ranges::all_of(shown, &ShownMap::empty)) return;
     std::vector<Image<float>> results;
     for (std::size_t i = 0; i < views.size(); ++i) {
-        results.push_back(kept(views, shown, i, alpha));
+        results.push_back(kept(views, shown, i, alpha, spool));
         results.back().moveTo(spool);
     }
     for (std::size_t i = 0; i < views.size(); ++i) *views[i].q = std::move(results[i]);
