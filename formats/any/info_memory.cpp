@@ -9,6 +9,7 @@
 #include "lib/packing/views_one_by_one.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
+#include "lib/splats/from_bundle.hpp"
 
 namespace stx {
 namespace {
@@ -24,6 +25,7 @@ struct ViewCommand {
         whilePacked,  ///< the same, beside the atlas
         whileRefined,
         atSurfaces,  ///< at all, where the limit allows it; else at one at a time, from a spool
+        atDiscs,     ///< the same
         atAll,
     } looks;
 };
@@ -45,7 +47,7 @@ constexpr ViewCommand kCommands[] = {
     {"select", &peak::kSelect, &peak::kSelect, atEach},
     {"refine", &peak::kRefine, &peak::kRefine, whileRefined},
     {"extract -o NAME.ply", &peak::kPoints, &peak::kPoints, atRefined},
-    {"extract -o NAME.ply --as splats", &peak::kSplats, &peak::kSplats, atAll},
+    {"extract -o NAME.ply --as splats", &peak::kSplats, &peak::kSplats, atDiscs},
     {"extract -o NAME.glb", &peak::kSurfaces, &peak::kSurfaces, atSurfaces},
     {"extract -o NAME.html", &peak::kPage, &peak::kPage, atAll},
 };
@@ -55,7 +57,7 @@ class MemoryOfCommands {
   public:
     MemoryOfCommands(const ViewTable& table, bool refines, const Limits& limits)
         : table_(table),
-          limit_(limits.maxMemoryBytes),
+          limits_(limits),
           refines_(refines),
           onDemand_(!table.whole()),
           refiningAll_(memoryOfAll(table, peak::kRefine)),
@@ -80,7 +82,9 @@ class MemoryOfCommands {
             case whileRefined:
                 return {refining_, !spooled_};
             case atSurfaces:
-                return withRefining(surfaces(takes));
+                return withRefining(spooled(takes, memoryOfSpooledSurfaces(table_)));
+            case atDiscs:
+                return withRefining(spooled(takes, memoryOfSpooledSplats(table_, limits_)));
             case atAll:
                 break;
         }
@@ -94,7 +98,7 @@ class MemoryOfCommands {
     [[nodiscard]] Takes withRefining(Takes takes) const {
         if (!refines_) return takes;
         // What is refined is in the spool until the end.
-        if (spooled_ && !takes.all) takes.bytes += limit_ / kSpoolPart;
+        if (spooled_ && !takes.all) takes.bytes += limits_.maxMemoryBytes / kSpoolPart;
         return {std::max(takes.bytes, takes.all ? refiningAll_ : refining_), takes.all};
     }
     [[nodiscard]] Takes packed(const PeakMemory& takes) const {
@@ -107,15 +111,15 @@ class MemoryOfCommands {
             viewsBeside += table_.bytesOf(i);
         return {*grid + viewsBeside, !one};
     }
-    [[nodiscard]] Takes surfaces(const PeakMemory& takes) const {
-        const std::uint64_t all = memoryOfAll(table_, takes),
-                            spooled = memoryOfSpooledSurfaces(table_);
-        const bool one = onDemand_ && all > limit_ && spooled <= limit_;
-        return {one ? spooled : all, !one};
+    [[nodiscard]] Takes spooled(const PeakMemory& takes, std::uint64_t inSpool) const {
+        const std::uint64_t all = memoryOfAll(table_, takes);
+        const bool one =
+            onDemand_ && all > limits_.maxMemoryBytes && inSpool <= limits_.maxMemoryBytes;
+        return {one ? inSpool : all, !one};
     }
 
     const ViewTable& table_;
-    std::uint64_t limit_;
+    const Limits& limits_;
     bool refines_, onDemand_;
     std::uint64_t refiningAll_, refining_;
     bool spooled_ = false;  ///< they are refined in a spool
