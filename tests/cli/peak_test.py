@@ -108,6 +108,8 @@ MOST = 1.15
 TRIES = 3
 # What selecting keeps beside that of each view, MiB: how it sees the samples of the surface.
 SEEN = 0.25
+# What refining keeps of each view, and what compares views does, MiB: points by which they are compared.
+COMPARED = 0.2
 
 
 def of_many():
@@ -124,6 +126,7 @@ def of_many():
         yield f"sheet {kind}", f"sheet {{}}.{kind} -o OUT.png"
         yield f"points {kind}", f"extract {{}}.{kind} -o OUT.ply"
         yield f"validate {kind}", f"validate {{}}.{kind}"
+        yield f"agreement {kind}", f"info {{}}.{kind} --agreement"
         yield f"select {kind}", f"select {{}}.{kind} -o OUT.exr --count 6"
     yield "set to exr", "convert SET -o OUT.exr"
     yield "set to mp4", "convert SET -o OUT.mp4"
@@ -162,7 +165,8 @@ def many_views(args, folder):
             return must([args.stx] + words + ["--threads", "2"], folder).usage.ru_maxrss / 1024
 
         few, many = (peak(count) for count in counts)
-        more = SEEN * (counts[1] - counts[0]) if name.startswith("select") else 0
+        kept = {"select": SEEN, "agreement": COMPARED}.get(name.split()[0], 0)
+        more = kept * (counts[1] - counts[0])
         # Whether two threads hold the most at one moment is chance, and likelier of many views.
         for _ in range(0 if args.measure else TRIES):
             if many > MOST * few + more:
@@ -235,8 +239,6 @@ def from_few(args, folder):
 
 # Of noisy views of 320²: how many, a limit under which they are refined in a spool, MiB, and one under which they are in memory.
 NOISY_VIEWS, NOISY_LIMIT, NOISY_IN_MEMORY = (16, 48), 1280, 16384
-# What refining keeps beside that of each view, MiB: points by which views are compared.
-COMPARED = 0.2
 # What is refined or refines first, and then looks at one view at a time.
 NOISY = {"refine exr": "refine {} -o OUT.exr", "refine mp4": "refine {} -o OUT.mp4 --without colours", "convert": "convert {} -o OUT.exr --refine noise",
          "folder": "extract {} -o OUT --refine noise", "points": "extract {} -o OUT.ply --refine noise,agree"}
