@@ -107,7 +107,8 @@ void setSplat(SplatCloud& cloud, std::size_t i, const Disc& d, glm::dvec3 origin
 std::vector<std::size_t> orderOf(const Bundle& about) {
     std::vector<std::size_t> order(about.views.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::ranges::stable_partition(order, [&](std::size_t i) { return about.views[i].background; });
+    std::stable_partition(order.begin(), order.end(),
+                          [&](std::size_t i) { return about.views[i].background; });
     return order;
 }
 
