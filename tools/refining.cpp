@@ -173,10 +173,12 @@ Result<std::unique_ptr<ViewTable>> refinedViews(std::unique_ptr<ViewTable> table
                                                 const RefineBundle& refine, bool looksFirst,
                                                 const std::filesystem::path& folder, Job& job) {
     const bool spooled = takesLessInSpool(*table, job.limits);
-    if (spooled) STX_CHECK(checkRoomBesideSpool(*table, job.limits));
     if (!table->whole() && (spooled || looksFirst)) {
-        STX_TRY(const bool needed, mayRefine(*table, settings, job));
-        if (!needed) return table;
+        auto needed = mayRefine(*table, settings, job);
+        if (needed && !*needed) return table;
+        // Where one view is too large, the limit that is named is enough for a spool, too.
+        if (spooled) STX_CHECK(checkRoomBesideSpool(*table, job.limits));
+        if (!needed) return propagate(needed);
     }
     if (!spooled) {
         STX_TRY(auto bundle, wholeBundle(std::move(table), job));
