@@ -113,7 +113,6 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
     save.noClobber = program.common.noClobber;
     if (timeline.count() == 1 && !frameName(o.output, 0)) {
         STX_TRY(auto table, frames->views(0, program.job));
-        frames.reset();
         lookAt(std::as_const(*table).about());
         STX_TRY(table, refinedStill(std::move(table), o, refining, program.job));
         STX_CHECK(saveStill(*table, o, save, program.job));
