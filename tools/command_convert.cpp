@@ -125,9 +125,12 @@ Converted summaryOf(const Bundle& bundle, bool countPoints) {
 
 /// What is there of a bundle, with the changes that look at all of its views, if any.
 Result<std::unique_ptr<ViewTable>> changedAsAsked(std::unique_ptr<ViewTable> table, bool imported,
+                                                  const std::filesystem::path& target,
                                                   const ConvertOptions& o, Program& program) {
     const auto bits = o.mesh->depthBits;
     if (o.refining.steps == "auto" && !o.cube && !bits) return table;
+    if (!o.cube && !bits)
+        return o.refining.refined(std::move(table), imported, folderOf(target), program.job);
     STX_TRY(auto bundle, wholeBundle(std::move(table), program.job));
     STX_CHECK(o.refining.refine(bundle, imported, program.job));
     if (o.cube) {
@@ -172,7 +175,8 @@ Result<Converted> convertStill(const std::filesystem::path& input,
         if (auto saved = withMeshViews(*mesh, *o.mesh, program, save); !saved)
             return tl::unexpected(saved.error().at(fmt::format("'{}'", input.string())));
     } else {
-        STX_TRY(auto table, changedAsAsked(std::move(std::get<1>(opened)), *imported, o, program));
+        STX_TRY(auto table,
+                changedAsAsked(std::move(std::get<1>(opened)), *imported, target, o, program));
         STX_CHECK(save(std::move(table), program.job));
     }
     done.points += tally.points();

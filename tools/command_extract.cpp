@@ -263,7 +263,7 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
                               : wanted.ending == ".drc" ? peak::kPointsDraco
                                                         : peak::kPoints;
     STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
-    STX_TRY(frames, refined(std::move(frames), o.refine, takes));
+    STX_TRY(frames, refined(std::move(frames), o.refine, takes, folderBeside(o.output)));
     STX_TRY(const std::size_t moment,
             momentOf(o.time, frames->timeline(), wanted.points ? "points are" : nullptr, o.input,
                      program.job));

@@ -272,7 +272,7 @@ Result<PackObject> openObject(const PackOptions& o, const std::string& input,
                               const std::string& name, Job& job) {
     preloadCodecs(input);
     STX_TRY(auto frames, openSequence(input, o.open.into(o.output), job));
-    STX_TRY(frames, refined(std::move(frames), o.refine, kPacking));
+    STX_TRY(frames, refined(std::move(frames), o.refine, kPacking, folderOf(o.output)));
     const Timeline timeline = frames->timeline();
     std::size_t moment = 0;
     if (timeline.moves()) {
@@ -366,8 +366,8 @@ Result<int> packInput(const PackOptions& options, Program& program) {
     STX_TRY(auto frames, openSequence(o.input, o.open.into(o.output), program.job));
     // One atlas for each frame is made in two passes.
     const bool twice = frames->timeline().moves() && !o.time;
-    STX_TRY(frames,
-            refined(std::move(frames), o.refine, kPacking, twice ? folderOf(o.output) : ""));
+    STX_TRY(frames, (twice ? refinedOnce : refined)(std::move(frames), o.refine, kPacking,
+                                                    folderOf(o.output)));
     const Timeline timeline = frames->timeline();
     const std::size_t count = timeline.count();
     const bool numbered = frameName(o.output, 0).has_value();

@@ -6,11 +6,11 @@
 #include "formats/any/open.hpp"
 #include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
+#include "formats/files/numbered.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/stopwatch.hpp"
 #include "lib/refine/poses.hpp"
-#include "lib/refine/refine_needed.hpp"
-#include "lib/registration/disagreement.hpp"
+#include "lib/registration/disagreement_by_view.hpp"
 #include "tools/commands.hpp"
 #include "tools/refining.hpp"
 
@@ -49,20 +49,30 @@ nlohmann::ordered_json stepsJson(const RefineReport& report) {
     return steps;
 }
 
-/// The views of one moment that take more memory side by side than there may be, and in which
-/// there is nothing to refine: they are read one by one. Else null.
-Result<std::unique_ptr<ViewTable>> exactViews(const RefineOptions& o,
-                                              const RefineSettings& settings, Sequence& frames,
-                                              Job& job) {
-    STX_TRY(const auto kind, recognise(o.input));
-    if (frames.timeline().count() > 1 || holdsSequences(o.output) ||
-        (kind != FileKind::exr && kind != FileKind::mpeg4))
-        return nullptr;
-    STX_TRY(auto table, frames.views(0, job));
-    if (table->whole() || memoryOfAll(*table, peak::kRefine) <= job.limits.maxMemoryBytes)
-        return nullptr;
-    STX_TRY(const bool needed, mayRefine(*table, settings, job));
-    if (needed) return nullptr;
+/// Notes which views still do not agree with those that show the same.
+Result<void> noteDisagreement(const ViewTable& table, const RefineSettings& settings, Job& job) {
+    const Bundle& bundle = table.about();
+    STX_TRY(const auto found, measureDepthDisagreement(table, job));
+    const bool aligned = settings.on(RefineStep::poses) || posesWereAligned(bundle);
+    if (const auto note = disagreementNote(bundle, found, aligned))
+        job.note("after refining, " + *note);
+    return {};
+}
+
+/// The views of one moment, refined. Those that are exact are read one by one, and so are those
+/// that take less memory in a spool.
+Result<std::unique_ptr<ViewTable>> refinedStill(std::unique_ptr<ViewTable> table,
+                                                const RefineOptions& o, Refining& refining,
+                                                Job& job) {
+    STX_CHECK(refining.check());
+    bool done = false;
+    const auto refine = [&](Bundle& bundle, PixelSpool* spool, Job& own) {
+        done = true;
+        return refining.refine(bundle, spool, own);
+    };
+    STX_TRY(table, refinedViews(std::move(table), refining.left(), refine, false,
+                                folderOf(o.output), job));
+    if (done) STX_CHECK(noteDisagreement(*table, refining.left(), job));
     return table;
 }
 
@@ -93,33 +103,29 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
             "'{}' moves, and the step 'poses' moves the cameras of one moment; leave it out",
             o.input);
     std::size_t views = 0;
-    bool before = false, first = true;
-    STX_TRY(auto exact, exactViews(o, settings, *frames, program.job));
-    frames =
-        changedOnTheWay(std::move(frames), o.output, [&](Bundle& bundle, Job& job) -> Result<void> {
-            for (const ReferenceView& view : bundle.views)
-                before = before || !view.refined.steps.empty();
-            views = bundle.views.size();
-            STX_CHECK(refining.refine(bundle, job));
-            // Of a film its first frame tells.
-            if (!std::exchange(first, false)) return {};
-            const bool aligned = settings.on(RefineStep::poses) || posesWereAligned(bundle);
-            if (const auto note =
-                    disagreementNote(bundle, measureDepthDisagreement(bundle), aligned))
-                job.note("after refining, " + *note);
-            return {};
-        });
+    bool before = false;
+    const auto lookAt = [&](const Bundle& bundle) {
+        views = bundle.views.size();
+        for (const ReferenceView& view : bundle.views)
+            before = before || !view.refined.steps.empty();
+    };
     SaveOptions save;
     save.noClobber = program.common.noClobber;
-    if (exact) {
-        views = exact->count();
-        for (const ViewHeader& view : exact->about().views)
-            before = before || !view.refined.steps.empty();
-        STX_CHECK(saveStill(*exact, o, save, program.job));
-    } else if (timeline.count() == 1 && !holdsSequences(o.output)) {
-        STX_TRY(const auto table, frames->views(0, program.job));
+    if (timeline.count() == 1 && !frameName(o.output, 0)) {
+        STX_TRY(auto table, frames->views(0, program.job));
+        lookAt(std::as_const(*table).about());
+        STX_TRY(table, refinedStill(std::move(table), o, refining, program.job));
         STX_CHECK(saveStill(*table, o, save, program.job));
     } else {
+        bool first = true;
+        frames = changedOnTheWay(std::move(frames), o.output,
+                                 [&](Bundle& bundle, Job& job) -> Result<void> {
+                                     lookAt(bundle);
+                                     STX_CHECK(refining.refine(bundle, job));
+                                     // Of a film its first frame tells.
+                                     if (!std::exchange(first, false)) return {};
+                                     return noteDisagreement(*viewsOf(bundle), settings, job);
+                                 });
         STX_CHECK(saveSequence(*frames, o.output, save, program.job));
     }
     const RefineReport& report = refining.report();

@@ -137,7 +137,7 @@ Result<Sheet> sheetOfOne(const SheetOptions& o, Job& job) {
         return sheetOf(atlas, o.settings, job);
     }
     STX_TRY(auto frames, openSequence(input, o.open, job));
-    STX_TRY(frames, refined(std::move(frames), o.refine, peak::kSheet));
+    STX_TRY(frames, refined(std::move(frames), o.refine, peak::kSheet, folderBeside(o.output)));
     if (frames->timeline().moves()) return sheetOf(*frames, o.settings, job);
     keepFreedMemory();  // of a view, for the next one
     STX_TRY(const auto table, frames->views(0, job));

@@ -11,6 +11,7 @@
 #include "lib/base/stopwatch.hpp"
 #include "lib/model/peak_memory.hpp"
 #include "lib/refine/refine_needed.hpp"
+#include "lib/render/surface/view_surfaces.hpp"
 #include "tools/camera_options.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/refining.hpp"
@@ -42,7 +43,7 @@ Result<Shown> writePage(const std::string& input, const OpenOptions& open,
         page = writeViewerPage(atlas, output, write, program.job);
     } else {
         STX_TRY(auto frames, openSequence(input, open, program.job));
-        STX_TRY(frames, refined(std::move(frames), refine, peak::kPage));
+        STX_TRY(frames, refined(std::move(frames), refine, peak::kPage, folderBeside(output)));
         page = writeViewerPage(*frames, output, write, program.job);
     }
     if (!page) return propagate(page);
@@ -52,37 +53,21 @@ Result<Shown> writePage(const std::string& input, const OpenOptions& open,
                  page->views, page->points};
 }
 
-/// The part of the memory limit that holds what is in use of a spool; see also render_scene.cpp.
-constexpr std::uint64_t kSpoolPart = 32;
-/// Of the surfaces of a view that is made from a spool, and of each pixel of all views what is
-/// known of its block and whether it is a corner, bytes.
-constexpr PeakMemory kSurfacesOfOne = {
-    peak::kSurfaces.what, peak::kSurfaces.perPixel + peak::kSurfaces.perPixelOfLargest};
-constexpr std::uint64_t kKnownOfSurfaces = 3;
-
-/// The views of a model, refined. Where they would take more memory than there may be, and nothing
-/// of them is to refine, they are in a spool, which is made then.
+/// The views of a model, refined; in a spool, which is made then, where they would take more memory
+/// than there may be.
 Result<Bundle> viewsOfModel(std::unique_ptr<ViewTable> table, const RefineSettings& settings,
                             const SurfacesOptions& options, const std::filesystem::path& output,
                             std::unique_ptr<FileSpool>& spool, Job& job) {
     const bool fewer = options.mostTriangles > 0;
     const PeakMemory& takes = fewer ? peak::kFewerTriangles : peak::kSurfaces;
     const std::uint64_t limit = job.limits.maxMemoryBytes;
-    const std::uint64_t inMemory = memoryOfAll(*table, takes);
-    if (!fewer && !table->whole() && inMemory > limit) {
-        std::uint64_t pixels = 0;
-        for (std::size_t i = 0; i < table->count(); ++i) pixels += table->pixelsOf(i);
-        const std::uint64_t beside =
-            memoryOfEach(*table, kSurfacesOfOne) + kKnownOfSurfaces * pixels;
-        const std::uint64_t fromSpool = beside + beside / (kSpoolPart - 1);
-        bool needed = true;
-        if (fromSpool <= limit) {
-            STX_TRY(needed, mayRefine(*table, settings, job));
-        }
-        if (!needed) {
-            STX_TRY(spool, FileSpool::create(folderOf(output), limit / kSpoolPart));
-            return wholeBundle(*table, *spool, job);
-        }
+    if (!fewer && !table->whole() && memoryOfAll(*table, takes) > limit &&
+        memoryOfSpooledSurfaces(*table) <= limit) {
+        STX_TRY(const bool needed, mayRefine(*table, settings, job));
+        STX_TRY(spool, FileSpool::create(folderOf(output), limit / kSpoolPart));
+        STX_TRY(auto bundle, wholeBundle(*table, *spool, job));
+        if (needed) STX_CHECK(refineViews(bundle, settings, *spool, job));
+        return bundle;
     }
     STX_TRY(auto bundle, wholeBundle(std::move(table), job));
     STX_CHECK(refineViews(bundle, settings, takes, job));
@@ -157,7 +142,7 @@ Result<int> extractPicture(const std::string& input, const OpenOptions& open,
     const Stopwatch watch;
     if (kind == DepthPicture::pair) STX_CHECK(checkTarget(depthFileOf(output), program));
     STX_TRY(auto frames, openSequence(input, open, program.job));
-    STX_TRY(frames, refined(std::move(frames), refine, peak::kExport));
+    STX_TRY(frames, refined(std::move(frames), refine, peak::kExport, folderBeside(output)));
     STX_TRY(const auto moment,
             momentOf(time, frames->timeline(), "a picture is", input, program.job));
     STX_TRY(const auto table, frames->views(moment, program.job));

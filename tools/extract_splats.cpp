@@ -6,13 +6,38 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/any/sequences.hpp"
+#include "formats/files/file_spool.hpp"
+#include "formats/files/files.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "lib/base/stopwatch.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/refining.hpp"
+#include "tools/view_tally.hpp"
 
 namespace stx::tools {
+
+namespace {
+
+/// The splats of one moment. What is known of each pixel is in a file where memory does not hold
+/// it.
+Result<SplatCloud> splatsOfTable(const ViewTable& table, const std::string& output,
+                                 const SplatSettings& settings, Job& job) {
+    const PeakMemory& takes = settings.most > 0 ? peak::kFewerSplats : peak::kSplats;
+    const std::uint64_t limit = job.limits.maxMemoryBytes, inMemory = memoryOfAll(table, takes);
+    std::unique_ptr<FileSpool> spool;
+    if (settings.most == 0 && inMemory > limit &&
+        memoryOfSpooledSplats(table, job.limits) <= limit) {
+        STX_TRY(spool, FileSpool::create(folderOf(output), limit / kSpoolPart));
+    } else {
+        std::uint64_t pixels = 0;
+        for (std::size_t i = 0; i < table.count(); ++i) pixels += table.pixelsOf(i);
+        STX_CHECK(checkPeak({takes.what, 0}, pixels, 0, inMemory, job.limits));
+    }
+    return splatsOfViews(table, settings, spool.get(), job);
+}
+
+}  // namespace
 
 Result<std::optional<ExtractAs>> extractedAs(const std::string& as,
                                              const std::filesystem::path& file) {
@@ -50,8 +75,9 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
                           Program& program) {
     const Stopwatch watch;
     STX_TRY(auto frames, openSequence(input, open, program.job));
-    STX_TRY(frames, refined(std::move(frames), refine,
-                            settings.most > 0 ? peak::kFewerSplats : peak::kSplats));
+    STX_TRY(frames,
+            refined(std::move(frames), refine,
+                    settings.most > 0 ? peak::kFewerSplats : peak::kSplats, folderBeside(output)));
     const Timeline timeline = frames->timeline();
     const bool numbered = frameName(output, 0).has_value();
     std::size_t first = 0, end = timeline.count();
@@ -63,15 +89,15 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
         program.job.note("files of splats have no times: one is written for each frame");
     }
     std::size_t views = 0, splats = 0;
-    std::int64_t points = 0;
+    ViewTally tally;
     std::uint64_t bytes = 0;
     for (std::size_t i = first; i < end; ++i) {
-        STX_TRY(auto bundle, frames->frame(i, program.job));
+        STX_TRY(auto table, frames->views(i, program.job));
         if (i == first) {
-            views = bundle.views.size();
-            points = bundle.pointCount();
+            views = table->count();
+            table = watchedViews(std::move(table), [&](auto k, auto& view) { tally.add(k, view); });
         }
-        STX_TRY(auto cloud, splatsOfBundle(std::move(bundle), settings, program.job));
+        STX_TRY(auto cloud, splatsOfTable(*table, output, settings, program.job));
         if (i == first) splats = cloud.positions.size();
         const std::string target = frameName(output, static_cast<int>(i - first)).value_or(output);
         STX_CHECK(writeSplats(target, std::move(cloud), program.outputOptions(), program.job));
@@ -90,7 +116,7 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
                                    {"input", input},
                                    {"output", output},
                                    {"views", views},
-                                   {"points", points},
+                                   {"points", tally.points()},
                                    {"splats", splats},
                                    {"seconds", seconds}}));
     return 0;

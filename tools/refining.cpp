@@ -7,6 +7,7 @@
 
 #include "formats/any/changed_once.hpp"
 #include "formats/any/save.hpp"
+#include "formats/files/file_spool.hpp"
 #include "formats/files/files.hpp"
 #include "lib/refine/refine_needed.hpp"
 
@@ -42,6 +43,80 @@ Result<void> checkPeakOfAll(const PeakMemory& step, const ViewTable& views, cons
     return checkPeak(step, pixels, largest, held, limits);
 }
 
+/// Whether refining takes less memory with the views in a spool. Small captures do not.
+bool takesLessInSpool(const ViewTable& views, const Limits& limits) {
+    return !views.whole() &&
+           memoryFromSpool(views, peak::kRefine, limits) < memoryOfAll(views, peak::kRefine);
+}
+
+/// Errors (invalidInput) where refining one view beside a spool takes more than the limit.
+Result<void> checkRoomBesideSpool(const ViewTable& views, const Limits& limits) {
+    std::uint64_t most = 0, pixels = 0;
+    for (std::size_t i = 0; i < views.count(); ++i) {
+        most = std::max({most, views.bytesToMake(i),
+                         views.bytesGiven(i) + peak::kRefine.perPixel * views.pixelsOf(i)});
+        pixels += views.pixelsOf(i);
+    }
+    const std::uint64_t beside = views.bytesHeld() + most;
+    return checkPeak({peak::kRefine.what, 0}, pixels, 0, beside + beside / (kSpoolPart - 1),
+                     limits);
+}
+
+Result<RefineReport> refineIn(PixelSpool* spool, Bundle& bundle, const RefineSettings& settings,
+                              Job& job) {
+    return spool ? stx::refine(bundle, settings, *spool, job) : stx::refine(bundle, settings, job);
+}
+
+/// Refines, in a spool if it is not null; a note says what was done.
+Result<void> refineAsAsked(Bundle& bundle, const RefineSettings& settings, PixelSpool* spool,
+                           Job& job) {
+    if (!settings.any()) return {};
+    STX_TRY(const auto report, refineIn(spool, bundle, settings, job));
+    if (report.changed()) job.note("refined: " + report.text());
+    return {};
+}
+
+/// What refineViews() does, in a spool if it is not null.
+Result<void> refineFor(const PeakMemory& then, const RefineSettings& settings, Bundle& bundle,
+                       PixelSpool* spool, Job& job) {
+    // Before the work, and not after it. From a spool what follows takes views one by one.
+    if (!spool) STX_CHECK(checkPeak(mostOf(then), bundle.views, job.limits));
+    STX_TRY(const auto report, refineIn(spool, bundle, settings, job));
+    if (report.changed()) job.note(report.note());
+    return {};
+}
+
+class RefinedFrames : public Sequence {
+  public:
+    RefinedFrames(std::unique_ptr<Sequence> frames, const RefineSettings& settings,
+                  const PeakMemory& then, std::filesystem::path folder)
+        : frames_(std::move(frames)), settings_(settings), then_(then), folder_(std::move(folder)) {
+        timeline_ = frames_->timeline();
+    }
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        STX_TRY(auto bundle, frames_->frame(index, job));
+        STX_CHECK(refineFor(then_, settings_, bundle, nullptr, job));
+        return bundle;
+    }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        STX_TRY(auto table, frames_->views(index, job));
+        const auto refine = [this](Bundle& bundle, PixelSpool* spool, Job& own) {
+            return refineFor(then_, settings_, bundle, spool, own);
+        };
+        // Where a view alone is too large, the limit that is named is enough for what follows, too.
+        if (!table->whole() && !takesLessInSpool(*table, job.limits) &&
+            memoryOfEach(*table, peak::kRefine) > job.limits.maxMemoryBytes)
+            STX_CHECK(checkPeakOfAll(mostOf(then_), *table, job.limits));
+        return refinedViews(std::move(table), settings_, refine, true, folder_, job);
+    }
+
+  private:
+    std::unique_ptr<Sequence> frames_;
+    RefineSettings settings_;
+    PeakMemory then_;
+    std::filesystem::path folder_;
+};
+
 }  // namespace
 
 Option refineOption(Command& command, std::string& text) {
@@ -66,30 +141,64 @@ Result<RefineSettings> refineSettings(const std::string& text) {
 Result<void> refineViews(Bundle& bundle, const RefineSettings& settings, const PeakMemory& then,
                          Job& job) {
     if (!settings.any()) return {};
-    // Before the work, and not after it.
-    STX_CHECK(checkPeak(mostOf(then), bundle.views, job.limits));
-    STX_TRY(const auto report, stx::refine(bundle, settings, job));
-    if (report.changed()) job.note(report.note());
-    return {};
+    return refineFor(then, settings, bundle, nullptr, job);
+}
+
+Result<void> refineViews(Bundle& bundle, const RefineSettings& settings, PixelSpool& spool,
+                         Job& job) {
+    return refineFor(peak::kRefine, settings, bundle, &spool, job);
 }
 
 Result<std::unique_ptr<Sequence>> refined(std::unique_ptr<Sequence> frames, const std::string& text,
                                           const PeakMemory& then,
-                                          const std::filesystem::path& keepIn) {
+                                          const std::filesystem::path& folder) {
     STX_TRY(const auto settings, refineSettings(text));
     if (!settings.any()) return frames;
-    const PeakMemory most = mostOf(then);
+    return std::make_unique<RefinedFrames>(std::move(frames), settings, then, folder);
+}
+
+Result<std::unique_ptr<Sequence>> refinedOnce(std::unique_ptr<Sequence> frames,
+                                              const std::string& text, const PeakMemory& then,
+                                              const std::filesystem::path& folder) {
+    STX_TRY(const auto settings, refineSettings(text));
+    if (!settings.any()) return frames;
     const auto refine = [settings, then](Bundle& bundle, Job& job) -> Result<void> {
         return refineViews(bundle, settings, then, job);
     };
-    const auto needed = [settings, most](const ViewTable& views, Job& job) -> Result<bool> {
-        auto found = mayRefine(views, settings, job);
-        // Where a view alone is too large, the limit that is named is enough for what follows, too.
-        if (!found) STX_CHECK(checkPeakOfAll(most, views, job.limits));
-        return found;
-    };
-    return keepIn.empty() ? changed(std::move(frames), refine, needed)
-                          : changedOnce(std::move(frames), refine, keepIn);
+    return changedOnce(std::move(frames), refine, folder);
+}
+
+Result<std::unique_ptr<ViewTable>> refinedViews(std::unique_ptr<ViewTable> table,
+                                                const RefineSettings& settings,
+                                                const RefineBundle& refine, bool looksFirst,
+                                                const std::filesystem::path& folder, Job& job) {
+    const bool spooled = takesLessInSpool(*table, job.limits);
+    if (!table->whole() && (spooled || looksFirst)) {
+        auto needed = mayRefine(*table, settings, job);
+        if (needed && !*needed) return table;
+        // Where one view is too large, the limit that is named is enough for a spool, too.
+        if (spooled) STX_CHECK(checkRoomBesideSpool(*table, job.limits));
+        if (!needed) return propagate(needed);
+    }
+    if (!spooled) {
+        STX_TRY(auto bundle, wholeBundle(std::move(table), job));
+        STX_CHECK(refine(bundle, nullptr, job));
+        return tableOf(std::move(bundle));
+    }
+    const std::uint64_t held = job.limits.maxMemoryBytes / kSpoolPart;
+    STX_TRY(auto spool, FileSpool::create(folder, held));
+    Job beside;  // what the spool takes is not there for others
+    beside.workFor(job);
+    beside.onProgress = job.onProgress;
+    beside.limits.maxMemoryBytes -= held;
+    STX_TRY(auto bundle, wholeBundle(*table, *spool, beside));
+    STX_CHECK(refine(bundle, spool.get(), beside));
+    beside.passNotesOn();
+    return tableOf(std::move(bundle), std::move(spool), held);
+}
+
+std::filesystem::path folderBeside(const std::string& output) {
+    return output == "-" ? std::filesystem::temp_directory_path() : folderOf(output);
 }
 
 std::unique_ptr<Sequence> changedOnTheWay(
@@ -109,10 +218,13 @@ void Refining::import(ImageSetOptions& options) {
     };
 }
 
-Result<void> Refining::refine(Bundle& bundle, Job& job) {
-    if (!imported_) STX_CHECK(checkNoImport(settings_));
-    STX_TRY(const auto found,
-            stx::refine(bundle, imported_ ? settings_.afterImport() : settings_, job));
+Result<void> Refining::check() const {
+    return imported_ ? Result<void>() : checkNoImport(settings_);
+}
+
+Result<void> Refining::refine(Bundle& bundle, PixelSpool* spool, Job& job) {
+    STX_CHECK(check());
+    STX_TRY(const auto found, refineIn(spool, bundle, left(), job));
     report_.add(found);
     report_.add(atImport_);
     return {};
@@ -128,7 +240,7 @@ Result<RefineSettings> ImportRefining::settings() const {
     return settings;
 }
 
-Result<void> ImportRefining::refine(Bundle& bundle, bool imported, Job& job) const {
+Result<RefineSettings> ImportRefining::left(bool imported, Job& job) const {
     STX_TRY(RefineSettings settings, RefineSettings::from(steps));
     settings = settings.asked();
     for (const RefineStepInfo& info : refineSteps())
@@ -138,11 +250,24 @@ Result<void> ImportRefining::refine(Bundle& bundle, bool imported, Job& job) con
                 fmt::format("the step '{}' of refining is of image sets and was not done: the "
                             "input is none",
                             info.name));
-    if (imported) settings = settings.afterImport();
-    if (!settings.any()) return {};
-    STX_TRY(const auto report, stx::refine(bundle, settings, job));
-    if (report.changed()) job.note("refined: " + report.text());
-    return {};
+    return imported ? settings.afterImport() : settings;
+}
+
+Result<void> ImportRefining::refine(Bundle& bundle, bool imported, Job& job) const {
+    STX_TRY(const auto settings, left(imported, job));
+    return refineAsAsked(bundle, settings, nullptr, job);
+}
+
+Result<std::unique_ptr<ViewTable>> ImportRefining::refined(std::unique_ptr<ViewTable> table,
+                                                           bool imported,
+                                                           const std::filesystem::path& folder,
+                                                           Job& job) const {
+    STX_TRY(const auto settings, left(imported, job));
+    if (!settings.any()) return table;
+    const auto refine = [&](Bundle& bundle, PixelSpool* spool, Job& own) {
+        return refineAsAsked(bundle, settings, spool, own);
+    };
+    return refinedViews(std::move(table), settings, refine, false, folder, job);
 }
 
 void addImportRefining(Command& command, ImportRefining& refining, const char* sets) {

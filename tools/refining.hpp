@@ -25,13 +25,37 @@ Option refineOption(Command& command, std::string& text);
 [[nodiscard]] Result<void> refineViews(Bundle& bundle, const RefineSettings& settings,
                                        const PeakMemory& then, Job& job);
 
+/// The same of views in a spool, which must outlive the bundle.
+[[nodiscard]] Result<void> refineViews(Bundle& bundle, const RefineSettings& settings,
+                                       PixelSpool& spool, Job& job);
+
 /// Frames that are refined when they are read; a note says which steps were done. `text` is that of
 /// the option. `then` is what they are for: errors (invalidInput) where they are too large for it.
-/// `keepIn`: of frames that are read more than once, a folder for what became of them.
+/// `folder`: for what memory does not hold. Views that are asked for one by one are in a spool
+/// there where that takes less (refinedViews()).
 [[nodiscard]] Result<std::unique_ptr<Sequence>> refined(std::unique_ptr<Sequence> frames,
                                                         const std::string& text,
                                                         const PeakMemory& then,
-                                                        const std::filesystem::path& keepIn = {});
+                                                        const std::filesystem::path& folder);
+/// The same of frames that are read more than once: what became of them is kept in the folder.
+[[nodiscard]] Result<std::unique_ptr<Sequence>> refinedOnce(std::unique_ptr<Sequence> frames,
+                                                            const std::string& text,
+                                                            const PeakMemory& then,
+                                                            const std::filesystem::path& folder);
+
+/// Does refine() of a bundle, or of one in a spool.
+using RefineBundle = std::function<Result<void>(Bundle& bundle, PixelSpool* spool, Job& job)>;
+/// The views of one moment, refined: as they are where mayRefine() finds nothing to do, else from
+/// memory, or from a spool in a folder where that takes less memory. What `refine` takes in memory,
+/// and what follows, it checks itself. `looksFirst`: whether mayRefine() is asked of views that
+/// memory holds, too.
+[[nodiscard]] Result<std::unique_ptr<ViewTable>> refinedViews(
+    std::unique_ptr<ViewTable> table, const RefineSettings& settings, const RefineBundle& refine,
+    bool looksFirst, const std::filesystem::path& folder, Job& job);
+
+/// The folder of an output, for what is kept beside memory; of standard output that of temporary
+/// files.
+[[nodiscard]] std::filesystem::path folderBeside(const std::string& output);
 
 /// Frames on their way into a target, each changed once: MPEG-4 films are written in two passes.
 [[nodiscard]] std::unique_ptr<Sequence> changedOnTheWay(
@@ -47,9 +71,16 @@ class Refining {
 
     /// Options by which an import does its steps and tells what they did; they use this object.
     void import(ImageSetOptions& options);
-    /// What is left to do of a bundle. Errors: (usage) a step that only an import can do, of what
-    /// is no image set; those of refine().
-    Result<void> refine(Bundle& bundle, Job& job);
+    /// What is left to do of a bundle. Errors: those of check() and refine().
+    Result<void> refine(Bundle& bundle, Job& job) { return refine(bundle, nullptr, job); }
+    /// The same; in a spool if it is not null.
+    Result<void> refine(Bundle& bundle, PixelSpool* spool, Job& job);
+    /// Errors (usage): a step that only an import can do, of what is no image set.
+    [[nodiscard]] Result<void> check() const;
+    /// What is left to do of what was read last.
+    [[nodiscard]] RefineSettings left() const {
+        return imported_ ? settings_.afterImport() : settings_;
+    }
     /// Of all that was read.
     [[nodiscard]] const RefineReport& report() const { return report_; }
 
@@ -69,9 +100,16 @@ struct ImportRefining {
 
     /// What an import is to do. Errors (usage): a name that is none.
     [[nodiscard]] Result<RefineSettings> settings() const;
-    /// Does the steps that --refine names of a bundle that is there; nothing is done by itself.
-    /// Notes say what was done, and which steps cannot be of what was not `imported` now.
+    /// The steps that --refine names of a bundle that is there; none are done by themselves. Notes
+    /// say which cannot be of what was not `imported` now.
+    [[nodiscard]] Result<RefineSettings> left(bool imported, Job& job) const;
+    /// Does them. Notes say what was done.
     Result<void> refine(Bundle& bundle, bool imported, Job& job) const;
+    /// The same of one moment: refinedViews().
+    [[nodiscard]] Result<std::unique_ptr<ViewTable>> refined(std::unique_ptr<ViewTable> table,
+                                                             bool imported,
+                                                             const std::filesystem::path& folder,
+                                                             Job& job) const;
 };
 
 /// --refine, and the options of single steps under the heading of image sets. `refining` must

@@ -13,6 +13,7 @@
 #include "lib/model/splat_cloud.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "lib/render/factory.hpp"
+#include "tools/refining.hpp"
 
 namespace stx::tools {
 namespace {
@@ -65,9 +66,6 @@ Result<SwayPose> swayPose(const RenderOptions& o, Sequence& frames, const Job& j
     return swayPose(o.camera, bundle);
 }
 
-/// The part of the memory limit that holds what is in use of a spool. Smaller parts save little:
-/// the rest is what preparing takes.
-constexpr std::uint64_t kBudgetPart = 32;
 /// What drawing from a spool takes beside that, bytes: for each pixel of all views what is known of
 /// blocks, and beside its images for each of the view that a thread prepares.
 constexpr std::uint64_t kKnown = 2;
@@ -89,12 +87,10 @@ Result<Bundle> readViews(const RenderOptions& o, const PeakMemory& drawing, cons
         pixels += table.pixelsOf(i);
     }
     const std::uint64_t beside = memoryOfEach(table, kPreparing) + kKnown * pixels;
-    const std::uint64_t fromSpool = beside + beside / (kBudgetPart - 1);
+    const std::uint64_t fromSpool = beside + beside / (kSpoolPart - 1);
     if (inMemory > limit && inMemory > fromSpool) {
         STX_CHECK(checkPeak({kPreparing.what, 0}, pixels, 0, fromSpool, job.limits));
-        STX_TRY(spool, FileSpool::create(o.output == "-" ? std::filesystem::temp_directory_path()
-                                                         : folderOf(o.output),
-                                         limit / kBudgetPart));
+        STX_TRY(spool, FileSpool::create(folderBeside(o.output), limit / kSpoolPart));
     } else if (auto ok = job.limits.checkAllocation(images, 1, "the views"); !ok) {
         return tl::unexpected(ok.error().at(table.where()));
     }

@@ -130,19 +130,31 @@ Json splatsJson(const SplatCloud& cloud) {
 }
 
 /// Fills in what only the pixels show.
-void addFromPixels(Json& out, const Bundle& bundle) {
+Result<void> addFromPixels(Json& out, const ViewTable& table, Job& job) {
+    const Bundle& about = table.about();
+    std::vector<std::int64_t> pointsOf(table.count());
+    std::vector<Bounds> boundsOf(table.count());
+    STX_CHECK(forEachView(table, {"counting points", 0}, job,
+                          [&](std::size_t i, auto view) -> Result<void> {
+                              pointsOf[i] = view->pointCount();
+                              if (!about.bounds) boundsOf[i] = view->computeBounds();
+                              return {};
+                          }));
     std::int64_t points = 0;
+    Bounds bounds;
     // A panorama becomes several views.
-    const bool each = bundle.views.size() == out["views"].size();
-    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
-        const auto n = bundle.views[i].pointCount();
-        if (each) out["views"][i]["points"] = n;
-        points += n;
+    const bool each = table.count() == out["views"].size();
+    for (std::size_t i = 0; i < table.count(); ++i) {
+        if (each) out["views"][i]["points"] = pointsOf[i];
+        points += pointsOf[i];
+        if (boundsOf[i].empty()) continue;
+        bounds.add(boundsOf[i].min);
+        bounds.add(boundsOf[i].max);
     }
     out["points"] = points;
     if (!out.contains("bounds"))
-        out["bounds"] =
-            boundsJson(bundle.bounds ? *bundle.bounds : bundle.computeBounds(), bundle.origin);
+        out["bounds"] = boundsJson(about.bounds ? *about.bounds : bounds, about.origin);
+    return {};
 }
 
 Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
@@ -434,16 +446,18 @@ Result<void> addMeasured(const fs::path& path, FileKind kind, const InfoOptions&
                          const OpenOptions& open, Json& out, Job& job) {
     const bool bounds = options.bounds && (!out.contains("bounds") || !out.contains("points"));
     if (bounds || options.agreement) {
-        STX_TRY(const auto bundle, openBundle(path, open, job));
-        if (bounds) addFromPixels(out, bundle);
+        STX_TRY(const auto table, openViews(path, open, job));
+        if (bounds) STX_CHECK(addFromPixels(out, *table, job));
         // An import names views that are off by itself.
-        if (options.agreement)
-            out["agreement"] = agreementJson(bundle, out["container"] != "imageset", job);
+        if (options.agreement) {
+            STX_TRY(out["agreement"], agreementJson(*table, out["container"] != "imageset", job));
+        }
     }
     if (options.memory) {
         auto memory = [&]() -> Result<Json> {
             const bool onDemand = kind == FileKind::mpeg4 || out["container"] == "exr";
-            if (!onDemand) return memoryOfSizes(out["views"], setOnDemand(kind, out, job.limits));
+            if (!onDemand)
+                return memoryOfSizes(out["views"], setOnDemand(kind, out, job.limits), job.limits);
             STX_TRY(const auto table, openViews(path, open, job));
             return memoryJson(*table, job);
         }();

@@ -6,7 +6,7 @@
 
 #include "lib/base/printable.hpp"
 #include "lib/refine/poses.hpp"
-#include "lib/registration/disagreement.hpp"
+#include "lib/registration/disagreement_by_view.hpp"
 
 namespace stx {
 namespace {
@@ -21,8 +21,9 @@ std::string quotedName(const nlohmann::ordered_json& name) {
 
 }  // namespace
 
-nlohmann::ordered_json agreementJson(const Bundle& bundle, bool notes, Job& job) {
-    const DepthDisagreement found = measureDepthDisagreement(bundle);
+Result<nlohmann::ordered_json> agreementJson(const ViewTable& table, bool notes, Job& job) {
+    const Bundle& bundle = table.about();
+    STX_TRY(const DepthDisagreement found, measureDepthDisagreement(table, job));
     auto out = nlohmann::ordered_json::array();
     for (std::size_t v = 0; v < bundle.views.size(); ++v) {
         const ViewDisagreement& of = found.views[v];

@@ -8,6 +8,8 @@
 #include "lib/base/parallel.hpp"
 #include "lib/packing/views_one_by_one.hpp"
 #include "lib/refine/refine_needed.hpp"
+#include "lib/render/surface/view_surfaces.hpp"
+#include "lib/splats/from_bundle.hpp"
 
 namespace stx {
 namespace {
@@ -19,8 +21,11 @@ struct ViewCommand {
     const PeakMemory* takesWithVectors;  ///< where views have normals or splats
     enum class Looks {
         atEach,       ///< one at a time, where they come on demand
-        atRefined,    ///< the same, unless they are refined before, which looks at all
+        atRefined,    ///< the same; where they are refined before, from a spool if that takes less
         whilePacked,  ///< the same, beside the atlas
+        whileRefined,
+        atSurfaces,  ///< at all, where the limit allows it; else at one at a time, from a spool
+        atDiscs,     ///< the same
         atAll,
     } looks;
 };
@@ -40,40 +45,96 @@ constexpr ViewCommand kCommands[] = {
     {"render --mode splat --light", &peak::kLitSplatMode, &peak::kLitSplatMode, atAll},
     {"pack", &peak::kAtlas, &peak::kAtlas, whilePacked},
     {"select", &peak::kSelect, &peak::kSelect, atEach},
-    {"refine", &peak::kRefine, &peak::kRefine, atAll},
+    {"refine", &peak::kRefine, &peak::kRefine, whileRefined},
     {"extract -o NAME.ply", &peak::kPoints, &peak::kPoints, atRefined},
-    {"extract -o NAME.ply --as splats", &peak::kSplats, &peak::kSplats, atAll},
-    {"extract -o NAME.glb", &peak::kSurfaces, &peak::kSurfaces, atAll},
+    {"extract -o NAME.ply --as splats", &peak::kSplats, &peak::kSplats, atDiscs},
+    {"extract -o NAME.glb", &peak::kSurfaces, &peak::kSurfaces, atSurfaces},
     {"extract -o NAME.html", &peak::kPage, &peak::kPage, atAll},
 };
 
-/// Of one command; `each`: it looks at views one by one.
-std::uint64_t bytesOf(const ViewCommand& command, const PeakMemory& takes, const ViewTable& table,
-                      bool each, bool refines) {
-    if (command.looks == whilePacked) {
-        // All views at once are those in memory beside the pages.
-        const auto grid = memoryOfGrid(table, PackSettings());
-        std::uint64_t viewsBeside = 0;
-        for (std::size_t i = 0; !each && !table.whole() && i < table.count(); ++i)
-            viewsBeside += table.bytesOf(i);
-        if (grid)
-            return std::max(*grid + viewsBeside, refines ? memoryOfAll(table, peak::kRefine) : 0);
+/// What commands take of views that may be refined before.
+class MemoryOfCommands {
+  public:
+    MemoryOfCommands(const ViewTable& table, bool refines, const Limits& limits)
+        : table_(table),
+          limits_(limits),
+          refines_(refines),
+          onDemand_(!table.whole()),
+          refiningAll_(memoryOfAll(table, peak::kRefine)),
+          refining_(refiningAll_) {
+        if (onDemand_)
+            refining_ = std::min(refiningAll_, memoryFromSpool(table, peak::kRefine, limits));
+        spooled_ = refining_ < refiningAll_;
     }
-    const std::uint64_t bytes = each ? memoryOfEach(table, takes) : memoryOfAll(table, takes);
-    return refines && !each ? std::max(bytes, memoryOfAll(table, peak::kRefine)) : bytes;
-}
 
-nlohmann::ordered_json memoryOf(const ViewTable& table, bool refines) {
+    struct Takes {
+        std::uint64_t bytes = 0;
+        bool all = true;  ///< it holds all views
+    };
+    [[nodiscard]] Takes of(const ViewCommand& command, const PeakMemory& takes) const {
+        switch (command.looks) {
+            case atEach:
+                return each(takes, onDemand_);
+            case atRefined:
+                return withRefining(each(takes, onDemand_ && (!refines_ || spooled_)));
+            case whilePacked:
+                return withRefining(packed(takes));
+            case whileRefined:
+                return {refining_, !spooled_};
+            case atSurfaces:
+                return withRefining(spooled(takes, memoryOfSpooledSurfaces(table_)));
+            case atDiscs:
+                return withRefining(spooled(takes, memoryOfSpooledSplats(table_, limits_)));
+            case atAll:
+                break;
+        }
+        return {std::max(memoryOfAll(table_, takes), refines_ ? refiningAll_ : 0), true};
+    }
+
+  private:
+    [[nodiscard]] Takes each(const PeakMemory& takes, bool one) const {
+        return {one ? memoryOfEach(table_, takes) : memoryOfAll(table_, takes), !one};
+    }
+    [[nodiscard]] Takes withRefining(Takes takes) const {
+        if (!refines_) return takes;
+        // What is refined is in the spool until the end.
+        if (spooled_ && !takes.all) takes.bytes += limits_.maxMemoryBytes / kSpoolPart;
+        return {std::max(takes.bytes, takes.all ? refiningAll_ : refining_), takes.all};
+    }
+    [[nodiscard]] Takes packed(const PeakMemory& takes) const {
+        const bool one = onDemand_ && (!refines_ || spooled_);
+        const auto grid = memoryOfGrid(table_, PackSettings());
+        if (!grid) return each(takes, one);
+        // All views at once are those in memory beside the pages.
+        std::uint64_t viewsBeside = 0;
+        for (std::size_t i = 0; !one && onDemand_ && i < table_.count(); ++i)
+            viewsBeside += table_.bytesOf(i);
+        return {*grid + viewsBeside, !one};
+    }
+    [[nodiscard]] Takes spooled(const PeakMemory& takes, std::uint64_t inSpool) const {
+        const std::uint64_t all = memoryOfAll(table_, takes);
+        const bool one =
+            onDemand_ && all > limits_.maxMemoryBytes && inSpool <= limits_.maxMemoryBytes;
+        return {one ? inSpool : all, !one};
+    }
+
+    const ViewTable& table_;
+    const Limits& limits_;
+    bool refines_, onDemand_;
+    std::uint64_t refiningAll_, refining_;
+    bool spooled_ = false;  ///< they are refined in a spool
+};
+
+nlohmann::ordered_json memoryOf(const ViewTable& table, bool refines, const Limits& limits) {
     const bool vectors = std::ranges::any_of(
         table.kinds(), [](const ViewImageKinds& k) { return k.normal || k.splatU || k.splatV; });
+    const MemoryOfCommands memory(table, refines, limits);
     auto commands = nlohmann::ordered_json::array();
     for (const ViewCommand& command : kCommands) {
-        const PeakMemory& takes = vectors ? *command.takesWithVectors : *command.takes;
-        const bool each =
-            !table.whole() && command.looks != atAll && (command.looks == atEach || !refines);
+        const auto takes = memory.of(command, vectors ? *command.takesWithVectors : *command.takes);
         commands.push_back({{"command", command.words},
-                            {"bytes", bytesOf(command, takes, table, each, refines)},
-                            {"views", each ? "one for each thread" : "all"}});
+                            {"bytes", takes.bytes},
+                            {"views", takes.all ? "all" : "one for each thread"}});
     }
     return {{"threads", threadCount()}, {"commands", std::move(commands)}};
 }
@@ -94,10 +155,11 @@ class SizesAlone : public ViewTable {
 
 Result<nlohmann::ordered_json> memoryJson(const ViewTable& table, Job& job) {
     STX_TRY(const bool refines, mayRefine(table, RefineSettings(), job));
-    return memoryOf(table, refines);
+    return memoryOf(table, refines, job.limits);
 }
 
-Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views, bool onDemand) {
+Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views, bool onDemand,
+                                             const Limits& limits) {
     Bundle sizes;
     for (const auto& view : views) {
         Camera& camera = sizes.views.emplace_back().camera;
@@ -109,9 +171,9 @@ Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views
                         "memory that it takes is not, either; leave out --memory",
                         view.value("name", ""));
     }
-    if (!onDemand) return memoryOf(*viewsOf(sizes), true);
+    if (!onDemand) return memoryOf(*viewsOf(sizes), true, limits);
     std::vector<ViewImageKinds> kinds(sizes.views.size());
-    return memoryOf(SizesAlone(std::move(sizes), std::move(kinds)), true);
+    return memoryOf(SizesAlone(std::move(sizes), std::move(kinds)), true, limits);
 }
 
 std::string memoryText(const nlohmann::ordered_json& memory) {

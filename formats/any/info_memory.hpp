@@ -17,7 +17,7 @@ namespace stx {
 /// Of views of which only the sizes are known, those of the field "views", which may be refined.
 /// `onDemand`: they are read when they are asked for. Errors (invalidInput): a size is not known.
 [[nodiscard]] Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views,
-                                                           bool onDemand);
+                                                           bool onDemand, const Limits& limits);
 
 /// The same for people, a row for each command.
 [[nodiscard]] std::string memoryText(const nlohmann::ordered_json& memory);

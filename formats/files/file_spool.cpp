@@ -54,29 +54,57 @@ struct FileSpool::File {
 
     std::mutex mutex;  ///< of what follows
     std::uint64_t size = 0;
-    std::map<void*, std::size_t> mapped;
+    struct Room {
+        std::size_t bytes;
+        off_t offset;
+    };
+    std::map<void*, Room> mapped;
+    /// Room that was given back, by its size. What is kept of views is as large of each.
+    std::multimap<std::size_t, off_t> unused;
     std::condition_variable_any stopped;
     std::jthread keeper;  ///< gives memory back
 
     void* map(std::size_t bytes) {
         const std::scoped_lock lock(mutex);
         settle();
+        const off_t offset = offsetFor(bytes);
+        void* room = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, file.get(), offset);
+        if (room == MAP_FAILED) throw std::bad_alloc();
+        mapped.emplace(room, Room{bytes, offset});
+        return room;
+    }
+    /// Room in the file. Under the lock.
+    off_t offsetFor(std::size_t bytes) {
+        if (const auto found = unused.find(bytes); found != unused.end()) {
+            const off_t offset = found->second;
+            unused.erase(found);
+            return offset;
+        }
         const auto offset = static_cast<off_t>(size);
         // A file with holes would end the process where the disk is full.
         if (const int error = ::posix_fallocate(file.get(), offset, static_cast<off_t>(bytes));
             error != 0)
             throw std::system_error(error, std::generic_category(),
                                     fmt::format("no room for pixels in '{}'", folder.string()));
-        void* room = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, file.get(), offset);
-        if (room == MAP_FAILED) throw std::bad_alloc();
         size += bytes;
-        mapped.emplace(room, bytes);
-        return room;
+        return offset;
+    }
+    void unmap(void* at) {
+        const std::scoped_lock lock(mutex);
+        const auto found = mapped.find(at);
+        if (found == mapped.end()) return;
+        ::munmap(at, found->second.bytes);
+        try {
+            unused.emplace(found->second.bytes, found->second.offset);
+        } catch (const std::bad_alloc&) {
+            // The file is larger then than it need be.
+        }
+        mapped.erase(found);
     }
     /// Under the lock.
     void settle() {
         if (mappedBytes(statm.get()) < others + budget) return;
-        for (const auto& [room, bytes] : mapped) ::madvise(room, bytes, MADV_DONTNEED);
+        for (const auto& [at, room] : mapped) ::madvise(at, room.bytes, MADV_DONTNEED);
     }
     void keep(const std::stop_token& stop) {
         std::unique_lock lock(mutex);
@@ -117,10 +145,8 @@ void FileSpool::settle() noexcept {
     file_->settle();
 }
 
-void FileSpool::give(void* room, std::size_t bytes) noexcept {
-    const std::scoped_lock lock(file_->mutex);
-    file_->mapped.erase(room);
-    ::munmap(room, inPages(bytes));
+void FileSpool::give(void* room, std::size_t /*bytes*/) noexcept {
+    file_->unmap(room);
 }
 
 }  // namespace stx

@@ -12,7 +12,7 @@ namespace stx {
 /// Pixels in a file without a name, which is gone with this. It is mapped: what is read or written
 /// comes into memory page by page, and all of it is given back there whenever it takes more than a
 /// budget, to the file, from where it comes again. So whatever goes over the pixels takes no more
-/// memory than that, however many there are.
+/// memory than that, however many there are. The file is as large as what is kept at a time.
 class FileSpool final : public PixelSpool {
   public:
     /// `budget`: bytes. Errors (io): no file can be made in `folder`.

@@ -22,7 +22,7 @@ Result<void> attendToPoses(Bundle& bundle, const ImageSetOptions& options, Refin
                            Job& job) {
     const bool refines = options.refine.atImport(RefineStep::poses, false);
     if (refines) {
-        STX_TRY(report.of(RefineStep::poses), alignPoses(bundle, job));
+        STX_TRY(report.of(RefineStep::poses), alignPoses(bundle, nullptr, job));
     }
     if (const auto note = disagreementNote(bundle, measureDepthDisagreement(bundle), refines))
         job.note(*note);

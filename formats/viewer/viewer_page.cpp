@@ -281,13 +281,15 @@ Result<Json> dataOf(const std::vector<ReferenceView>& views, const Bounds& bound
     return j;
 }
 
-Bundle part(const Bundle& bundle, bool background) {
+/// Takes the views of one kind out of a bundle.
+Bundle takePart(Bundle& bundle, bool background) {
     Bundle out;
     out.title = bundle.title;
     out.origin = bundle.origin;
-    for (const ReferenceView& view : bundle.views) {
-        if (view.background == background) out.views.push_back(view);
-    }
+    for (ReferenceView& view : bundle.views)
+        if (view.background == background) out.views.push_back(std::move(view));
+    std::erase_if(bundle.views,
+                  [&](const ReferenceView& view) { return view.background == background; });
     return out;
 }
 
@@ -336,11 +338,12 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
         // any.
         Json numbers = Json::array();
         std::vector<Bundle> parts;
-        parts.push_back(part(bundle, false));
-        parts.push_back(part(bundle, true));
+        parts.push_back(takePart(bundle, false));
+        parts.push_back(takePart(bundle, true));
         std::erase_if(parts, [](const Bundle& b) { return b.views.empty(); });
         for (std::size_t k = 0; k < parts.size(); ++k) {
             STX_TRY(const auto atlases, packForPage(parts[k], line.moves(), job));
+            parts[k].views.clear();
             STX_TRY(auto scene, pageScene(atlases, options.colours, job));
             STX_TRY(const int number, writer->add(k, std::move(scene)));
             numbers.push_back(number);

@@ -23,9 +23,8 @@ class Still : public Sequence {
 
 class Changed : public Sequence {
   public:
-    Changed(std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle&, Job&)> change,
-            std::function<Result<bool>(const ViewTable&, Job&)> needed)
-        : frames_(std::move(frames)), change_(std::move(change)), needed_(std::move(needed)) {
+    Changed(std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle&, Job&)> change)
+        : frames_(std::move(frames)), change_(std::move(change)) {
         timeline_ = frames_->timeline();
     }
     Result<Bundle> frame(std::size_t index, Job& job) override {
@@ -33,22 +32,10 @@ class Changed : public Sequence {
         STX_CHECK(change_(bundle, job));
         return bundle;
     }
-    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
-        if (!needed_) return Sequence::views(index, job);
-        STX_TRY(auto table, frames_->views(index, job));
-        if (!table->whole()) {
-            STX_TRY(const bool needed, needed_(*table, job));
-            if (!needed) return table;
-        }
-        STX_TRY(auto bundle, wholeBundle(std::move(table), job));
-        STX_CHECK(change_(bundle, job));
-        return tableOf(std::move(bundle));
-    }
 
   private:
     std::unique_ptr<Sequence> frames_;
     std::function<Result<void>(Bundle&, Job&)> change_;
-    std::function<Result<bool>(const ViewTable&, Job&)> needed_;
 };
 
 class ChangedByView : public Sequence {
@@ -271,10 +258,9 @@ std::unique_ptr<Sequence> sequenceOf(Bundle still) {
     return std::make_unique<Still>(std::move(still));
 }
 
-std::unique_ptr<Sequence> changed(
-    std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle&, Job&)> change,
-    std::function<Result<bool>(const ViewTable& views, Job& job)> needed) {
-    return std::make_unique<Changed>(std::move(frames), std::move(change), std::move(needed));
+std::unique_ptr<Sequence> changed(std::unique_ptr<Sequence> frames,
+                                  std::function<Result<void>(Bundle&, Job&)> change) {
+    return std::make_unique<Changed>(std::move(frames), std::move(change));
 }
 
 std::unique_ptr<Sequence> changedByView(std::unique_ptr<Sequence> frames, ViewChange change) {

@@ -89,11 +89,9 @@ class Sequence {
 /// A bundle that stands still.
 [[nodiscard]] std::unique_ptr<Sequence> sequenceOf(Bundle still);
 
-/// The same frames, each changed by `change`, for which all views of a frame are in memory, unless
-/// `needed` says of the views of one that nothing in them would change.
+/// The same frames, each changed by `change`, for which all views of a frame are in memory.
 [[nodiscard]] std::unique_ptr<Sequence> changed(
-    std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle& frame, Job& job)> change,
-    std::function<Result<bool>(const ViewTable& views, Job& job)> needed = {});
+    std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle& frame, Job& job)> change);
 
 /// The same frames, whose views are changed one by one.
 [[nodiscard]] std::unique_ptr<Sequence> changedByView(std::unique_ptr<Sequence> frames,

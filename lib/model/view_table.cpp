@@ -49,6 +49,30 @@ class HeldViews : public ViewTable {
     }
 };
 
+struct OwnSpool {
+    std::unique_ptr<PixelSpool> spool;
+};
+
+/// Keeps the spool longer than the bundle, which ViewTable has.
+class SpooledViews : private OwnSpool, public ViewTable {
+  public:
+    SpooledViews(std::vector<ViewImageKinds> kinds, Bundle bundle, std::unique_ptr<PixelSpool> in,
+                 std::uint64_t held)
+        : OwnSpool{std::move(in)}, ViewTable(std::move(bundle), std::move(kinds)), held_(held) {}
+
+    std::uint64_t bytesHeld() const override { return held_; }
+    std::uint64_t bytesGiven(std::size_t) const override { return 0; }
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job&) const override {
+        spool->settle();
+        return std::shared_ptr<const ReferenceView>(std::shared_ptr<void>(), &about().views[index]);
+    }
+
+  private:
+    std::uint64_t held_;
+};
+
 Bundle headersOf(const Bundle& bundle) {
     Bundle headers;
     headers.title = bundle.title;
@@ -193,6 +217,13 @@ std::unique_ptr<ViewTable> tableOf(Bundle bundle) {
     return std::make_unique<HeldViews>(std::move(bundle));
 }
 
+std::unique_ptr<ViewTable> tableOf(Bundle bundle, std::unique_ptr<PixelSpool> spool,
+                                   std::uint64_t held) {
+    std::vector<ViewImageKinds> kinds = kindsOf(bundle);
+    return std::make_unique<SpooledViews>(std::move(kinds), std::move(bundle), std::move(spool),
+                                          held);
+}
+
 std::unique_ptr<ViewTable> viewsOf(const Bundle& bundle) {
     return std::make_unique<HeldViews>(&bundle);
 }
@@ -238,7 +269,17 @@ Result<Bundle> wholeBundle(const ViewTable& table, Job& job) {
 }
 
 Result<Bundle> wholeBundle(const ViewTable& table, PixelSpool& spool, Job& job) {
-    return someViews(table, std::vector<bool>(table.count(), true), &spool, job);
+    Bundle bundle = headersOf(table.about());
+    std::atomic<std::int64_t> finished = 0;
+    STX_CHECK(forEachView(
+        table, {"reading", 0}, job,
+        [&](std::size_t index, std::shared_ptr<const ReferenceView> view) -> Result<void> {
+            bundle.views[index] = std::move(*ownView(std::move(view)));
+            bundle.views[index].moveTo(&spool);
+            job.progress(++finished, static_cast<std::int64_t>(table.count()), "reading views");
+            return {};
+        }));
+    return bundle;
 }
 
 void noteMaterialLeftOut(const ViewTable& table, Job& job) {
@@ -288,6 +329,19 @@ std::uint64_t memoryOfEach(const ViewTable& table, const PeakMemory& work) {
            most * std::min<std::uint64_t>(mostAtOnce(table, work), table.count());
 }
 
+std::uint64_t memoryFromSpool(const ViewTable& table, const PeakMemory& work,
+                              const Limits& limits) {
+    std::uint64_t most = 1;
+    for (std::size_t i = 0; i < table.count(); ++i)
+        most = std::max(most, memoryOfOne(table, i, work));
+    const std::uint64_t limit = limits.maxMemoryBytes;
+    const std::uint64_t beside = table.bytesHeld() + limit / kSpoolPart;
+    const std::uint64_t room = limit > beside ? (limit - beside) / most : 0;
+    const auto count = std::max<std::uint64_t>(table.count(), 1);
+    return beside +
+           most * std::clamp<std::uint64_t>(room, 1, std::min(mostAtOnce(table, work), count));
+}
+
 std::uint64_t memoryOfAll(const ViewTable& table, const PeakMemory& work) {
     std::uint64_t bytes = 0, largest = 0;
     for (std::size_t i = 0; i < table.count(); ++i) {
@@ -300,7 +354,7 @@ std::uint64_t memoryOfAll(const ViewTable& table, const PeakMemory& work) {
 Result<void> forEachView(
     const ViewTable& table, const PeakMemory& work, Job& job,
     const std::function<Result<void>(std::size_t, std::shared_ptr<const ReferenceView>)>& each,
-    const std::function<Result<void>(std::size_t)>& inOrder) {
+    const std::function<Result<void>(std::size_t)>& inOrder, const std::function<bool()>& enough) {
     const std::size_t count = table.count();
     if (count == 0) return {};
     const std::uint64_t held = table.bytesHeld();
@@ -313,6 +367,7 @@ Result<void> forEachView(
     const auto room = (job.limits.maxMemoryBytes - held) / most;
     const std::uint64_t atOnce = std::clamp<std::uint64_t>(room, 1, mostAtOnce(table, work));
     for (std::size_t first = 0; first < count; first += atOnce) {
+        if (enough && enough()) return {};
         const std::size_t end = std::min<std::size_t>(first + atOnce, count);
         std::vector<Result<void>> done(end - first);
         parallelFor(static_cast<std::int64_t>(first), static_cast<std::int64_t>(end),

@@ -101,10 +101,14 @@ class ViewTable {
 /// A bundle in memory as a table. The second kind does not copy it; it must outlive the table.
 [[nodiscard]] std::unique_ptr<ViewTable> tableOf(Bundle bundle);
 [[nodiscard]] std::unique_ptr<ViewTable> viewsOf(const Bundle& bundle);
+/// A bundle whose images are in a spool, as a table that keeps both. It is not whole(): what takes
+/// views one by one finds them there. `held`: what the spool takes of memory at most, bytes.
+[[nodiscard]] std::unique_ptr<ViewTable> tableOf(Bundle bundle, std::unique_ptr<PixelSpool> spool,
+                                                 std::uint64_t held);
 /// All views of a table in memory. Errors: those of its views; (invalidInput) more than the memory
 /// limit.
 [[nodiscard]] Result<Bundle> wholeBundle(const ViewTable& table, Job& job);
-/// The same in a spool, which must outlive it.
+/// The same in a spool, which must outlive it; memory is taken as by forEachView().
 [[nodiscard]] Result<Bundle> wholeBundle(const ViewTable& table, PixelSpool& spool, Job& job);
 /// Some of the views, in a spool if it is not null; the others have their headers only. `look`, if
 /// any, is called with each that is read, from any thread.
@@ -142,17 +146,26 @@ struct ViewChange {
 [[nodiscard]] std::uint64_t memoryOfEach(const ViewTable& table, const PeakMemory& work);
 [[nodiscard]] std::uint64_t memoryOfAll(const ViewTable& table, const PeakMemory& work);
 
+/// The part of the memory limit that holds what is in use of a spool, where views are in one.
+/// Smaller parts save little: the rest is what work on a view takes.
+inline constexpr std::uint64_t kSpoolPart = 32;
+/// Memory of such work on as many views at a time as the limit has room for, beside such a spool
+/// with all of them, bytes. Above the limit: even one view is too large.
+[[nodiscard]] std::uint64_t memoryFromSpool(const ViewTable& table, const PeakMemory& work,
+                                            const Limits& limits);
+
 /// Goes through all views, in rounds of as many at a time as there are threads and as the memory
 /// limit has room for (one where PeakMemory::oneByOneFrom says so): `each` is called with a view
 /// from several threads, then `inOrder`, if any, for the views of the round one after the other, in
 /// their order. Views are given back after their `each`, unless it keeps them. `work` is what
 /// `each` and `inOrder` take beside one view. Errors: (invalidInput) before the first view is read,
 /// one view takes more than the limit; those of view(), of `each` and of `inOrder`, the first by
-/// number; cancelled.
+/// number; cancelled. `enough`, if any, is asked before each round: true leaves out what is left.
 [[nodiscard]] Result<void> forEachView(
     const ViewTable& table, const PeakMemory& work, Job& job,
     const std::function<Result<void>(std::size_t index, std::shared_ptr<const ReferenceView> view)>&
         each,
-    const std::function<Result<void>(std::size_t index)>& inOrder = {});
+    const std::function<Result<void>(std::size_t index)>& inOrder = {},
+    const std::function<bool()>& enough = {});
 
 }  // namespace stx

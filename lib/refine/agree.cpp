@@ -4,7 +4,6 @@
 #include <utility>
 #include <vector>
 
-#include "lib/base/parallel.hpp"
 #include "lib/refine/noise.hpp"
 
 namespace stx {
@@ -42,35 +41,34 @@ Opinion opinionOf(const Partner& p, const DepthAxis& axis, float x, float y, flo
 }
 
 /// The new points of one view, and what is left of its noise.
-std::pair<Image<float>, float> moved(std::span<const NoisyView> views, std::size_t number) {
+std::pair<Image<float>, float> moved(std::span<const NoisyView> views, std::size_t number,
+                                     PixelSpool* spool) {
     const NoisyView& view = views[number];
     const std::vector<Partner> partners = partnersOf(views, number);
     const DepthAxis& axis = view.space->axis;
     Image<float> out = *view.q;
     std::vector<double> left(static_cast<std::size_t>(out.height()), 0.0);
     std::vector<std::int64_t> points(left.size(), 0);
-    parallelForBlocks(0, out.height(), 16, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y) {
-            for (int x = 0; x < out.width(); ++x) {
-                const float q = view.q->at(x, y), own = view.surface.at(x, y).z;
-                if (!(q > 0.0f) || !(own > 0.0f)) continue;
-                float sum = 0, weight = 1.0f / (own * own);
-                for (const Partner& p : partners) {
-                    const Opinion opinion = opinionOf(p, axis, static_cast<float>(x) + 0.5f,
-                                                      static_cast<float>(y) + 0.5f, q);
-                    if (!(opinion.variance > 0.0f) ||
-                        opinion.move * opinion.move >
-                            kAgreementBand * kAgreementBand * (own * own + opinion.variance))
-                        continue;
-                    sum += opinion.move / opinion.variance;
-                    weight += 1.0f / opinion.variance;
-                }
-                const float value = q + sum / weight;
-                if (value > 0.0f) out.at(x, y) = value;
-                const double scale = axis.relativeScale(q);
-                left[static_cast<std::size_t>(y)] += 1.0 / (weight * scale * scale);
-                ++points[static_cast<std::size_t>(y)];
+    forRows(out, spool, [&](int y) {
+        for (int x = 0; x < out.width(); ++x) {
+            const float q = view.q->at(x, y), own = view.surface.at(x, y).z;
+            if (!(q > 0.0f) || !(own > 0.0f)) continue;
+            float sum = 0, weight = 1.0f / (own * own);
+            for (const Partner& p : partners) {
+                const Opinion opinion = opinionOf(p, axis, static_cast<float>(x) + 0.5f,
+                                                  static_cast<float>(y) + 0.5f, q);
+                if (!(opinion.variance > 0.0f) ||
+                    opinion.move * opinion.move >
+                        kAgreementBand * kAgreementBand * (own * own + opinion.variance))
+                    continue;
+                sum += opinion.move / opinion.variance;
+                weight += 1.0f / opinion.variance;
             }
+            const float value = q + sum / weight;
+            if (value > 0.0f) out.at(x, y) = value;
+            const double scale = axis.relativeScale(q);
+            left[static_cast<std::size_t>(y)] += 1.0 / (weight * scale * scale);
+            ++points[static_cast<std::size_t>(y)];
         }
     });
     const auto mean = meanOfRows(left, points);
@@ -79,11 +77,14 @@ std::pair<Image<float>, float> moved(std::span<const NoisyView> views, std::size
 
 }  // namespace
 
-void agreeOnDepth(std::span<NoisyView> views) {
+void agreeOnDepth(std::span<NoisyView> views, PixelSpool* spool) {
     if (views.size() < 2) return;
     for (int round = 0; round < kAgreementRounds; ++round) {
         std::vector<std::pair<Image<float>, float>> results;
-        for (std::size_t i = 0; i < views.size(); ++i) results.push_back(moved(views, i));
+        for (std::size_t i = 0; i < views.size(); ++i) {
+            results.push_back(moved(views, i, spool));
+            results.back().first.moveTo(spool);
+        }
         for (std::size_t i = 0; i < views.size(); ++i) {
             *views[i].q = std::move(results[i].first);
             views[i].left = kUnconfirmed * results[i].second;

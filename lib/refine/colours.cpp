@@ -84,7 +84,7 @@ Pull pullOf(const Beside& other, float x, float y, float q, float scale, float l
 }
 
 Image<float> matched(std::span<const NoisyView> views, std::span<const Image<float>> lightness,
-                     std::size_t number) {
+                     std::size_t number, PixelSpool* spool) {
     const NoisyView& view = views[number];
     const DepthAxis& axis = view.space->axis;
     std::vector<Beside> others;
@@ -93,22 +93,20 @@ Image<float> matched(std::span<const NoisyView> views, std::span<const Image<flo
                           warpFrom(views[i].space->pixelFromWorld * view.space->worldFromPixel)});
     Image<float> out = *view.q;
     Image<Pull> pulls(out.width(), out.height());
-    parallelForBlocks(0, out.height(), 16, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y) {
-            for (int x = 0; x < out.width(); ++x) {
-                const float q = view.q->at(x, y), doubt = view.surface.at(x, y).z;
-                const float light = lightness[number].at(x, y);
-                if (!(q > 0.0f) || !(doubt > 0.0f) || light < 0.0f) continue;
-                Pull sum;
-                for (const Beside& other : others) {
-                    const Pull pull =
-                        pullOf(other, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f, q,
-                               axis.relativeScale(q), light, doubt);
-                    sum.slope += pull.slope;
-                    sum.curvature += pull.curvature;
-                }
-                pulls.at(x, y) = sum;
+    forRows(out, spool, [&](int y) {
+        for (int x = 0; x < out.width(); ++x) {
+            const float q = view.q->at(x, y), doubt = view.surface.at(x, y).z;
+            const float light = lightness[number].at(x, y);
+            if (!(q > 0.0f) || !(doubt > 0.0f) || light < 0.0f) continue;
+            Pull sum;
+            for (const Beside& other : others) {
+                const Pull pull =
+                    pullOf(other, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f, q,
+                           axis.relativeScale(q), light, doubt);
+                sum.slope += pull.slope;
+                sum.curvature += pull.curvature;
             }
+            pulls.at(x, y) = sum;
         }
     });
     parallelForBlocks(0, out.height(), 16, [&](std::int64_t first, std::int64_t last) {
@@ -146,14 +144,19 @@ Image<float> matched(std::span<const NoisyView> views, std::span<const Image<flo
 
 }  // namespace
 
-void agreeOnColours(std::span<const NoisyView> views) {
+void agreeOnColours(std::span<const NoisyView> views, PixelSpool* spool) {
     if (views.size() < 2) return;
     std::vector<Image<float>> lightness;
-    for (const NoisyView& view : views) lightness.push_back(lightnessOf(view));
+    for (const NoisyView& view : views) {
+        lightness.push_back(lightnessOf(view));
+        lightness.back().moveTo(spool);
+    }
     for (int round = 0; round < kColourRounds; ++round) {
         std::vector<Image<float>> results;
-        for (std::size_t i = 0; i < views.size(); ++i)
-            results.push_back(matched(views, lightness, i));
+        for (std::size_t i = 0; i < views.size(); ++i) {
+            results.push_back(matched(views, lightness, i, spool));
+            results.back().moveTo(spool);
+        }
         for (std::size_t i = 0; i < views.size(); ++i) *views[i].q = std::move(results[i]);
     }
 }

@@ -193,33 +193,50 @@ float between(const Image<float>& q, float x, float y) {
     return (a * (1 - tx) + b * tx) * (1 - ty) + (c * (1 - tx) + d * tx) * ty;
 }
 
-/// How far apart views are where they may show the same surface, at single points: shares of q;
-/// none when they hardly do.
+/// A point of a grid over a view: its pixel's middle, and its q.
+struct GridPixel {
+    float x, y, q;
+};
+
+std::vector<GridPixel> gridOf(const Image<float>& q) {
+    std::vector<GridPixel> grid;
+    const int step = std::max(1, std::max(q.width(), q.height()) / kPointsAcross);
+    for (int y = step / 2; y < q.height(); y += step)
+        for (int x = step / 2; x < q.width(); x += step)
+            if (const float here = q.at(x, y); here > 0.0f)
+                grid.push_back({static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f, here});
+    return grid;
+}
+
+/// How far apart views are where they may show the same surface, at single points: shares of q, in
+/// any order; none when they hardly do. Each view is looked at by itself: they need not all be in
+/// memory.
 std::vector<float> pointsApart(std::span<const EdgeView> views,
                                const std::vector<const Image<float>*>& q) {
-    std::vector<float> apart;
-    for (std::size_t i = 0; i < views.size(); ++i) {
-        const int step = std::max(1, std::max(q[i]->width(), q[i]->height()) / kPointsAcross);
-        for (std::size_t k = 0; k < views.size(); ++k) {
+    const auto count = static_cast<std::int64_t>(views.size());
+    std::vector<std::vector<GridPixel>> grids(views.size());
+    parallelFor(0, count, [&](std::int64_t i) {
+        grids[static_cast<std::size_t>(i)] = gridOf(*q[static_cast<std::size_t>(i)]);
+    });
+    std::vector<std::vector<float>> found(views.size());
+    parallelFor(0, count, [&](std::int64_t number) {
+        const auto k = static_cast<std::size_t>(number);
+        for (std::size_t i = 0; i < views.size(); ++i) {
             if (k == i) continue;
             const Warp warp =
                 warpFrom(views[k].space->pixelFromWorld * views[i].space->worldFromPixel);
-            for (int y = step / 2; y < q[i]->height(); y += step) {
-                for (int x = step / 2; x < q[i]->width(); x += step) {
-                    const float here = q[i]->at(x, y);
-                    if (!(here > 0.0f)) continue;
-                    const glm::vec4 h = warp.homogeneous(static_cast<float>(x) + 0.5f,
-                                                         static_cast<float>(y) + 0.5f, here);
-                    if (!(h.w > 0.0f)) continue;
-                    const float u = h.x / h.w, v = h.y / h.w, at = h.z / h.w;
-                    const float there = between(*q[k], u - 0.5f, v - 0.5f);
-                    const float share =
-                        std::abs(there - at) / views[k].space->axis.relativeScale(at);
-                    if (there > 0.0f && share < kSameSurface) apart.push_back(share);
-                }
+            for (const GridPixel& p : grids[i]) {
+                const glm::vec4 h = warp.homogeneous(p.x, p.y, p.q);
+                if (!(h.w > 0.0f)) continue;
+                const float u = h.x / h.w, v = h.y / h.w, at = h.z / h.w;
+                const float there = between(*q[k], u - 0.5f, v - 0.5f);
+                const float share = std::abs(there - at) / views[k].space->axis.relativeScale(at);
+                if (there > 0.0f && share < kSameSurface) found[k].push_back(share);
             }
         }
-    }
+    });
+    std::vector<float> apart;
+    for (const auto& part : found) apart.insert(apart.end(), part.begin(), part.end());
     if (apart.size() < kFewPoints) apart.clear();
     return apart;
 }
@@ -244,6 +261,7 @@ struct EdgePixel {
     int x, y;
     float front, back;  ///< q of both surfaces there
     float ownShare;
+    glm::vec3 colour;
 };
 
 std::vector<EdgePixel> edgePixels(const EdgeView& view) {
@@ -258,7 +276,8 @@ std::vector<EdgePixel> edgePixels(const EdgeView& view) {
     for (std::size_t k = 0; k < found.size(); k += stride) {
         const int x = found[k].x, y = found[k].y, i = found[k].z;
         if (const auto share = edges.ownShare(x, y, i))
-            pixels.push_back({x, y, view.q->at(x, y), edges.goesOn(x, y, i), *share});
+            pixels.push_back({x, y, view.q->at(x, y), edges.goesOn(x, y, i), *share,
+                              glm::vec3(view.texture->at(x, y))});
     }
     return pixels;
 }
@@ -300,43 +319,42 @@ std::optional<float> pixelsOff(const EdgeView& view, const SeenAt& at) {
     return std::abs(there - at.q) / width;
 }
 
-/// What others say of the pixels at edges of one view.
+/// What a view says of the pixels at edges of others.
 struct Witnesses {
     int asked = 0, front = 0;  ///< have colours of both surfaces; that is theirs in front
     std::vector<float> off;    ///< pixelsOff()
-};
 
-Witnesses witnessesOf(std::span<const EdgeView> views, std::size_t i, std::size_t every) {
-    Witnesses found;
-    const EdgeView& own = views[i];
-    const auto pixels = edgePixels(own);
-    for (std::size_t k = i % every; k < views.size(); k += every) {
-        if (k == i) continue;
-        const Warp warp = warpFrom(views[k].space->pixelFromWorld * own.space->worldFromPixel);
+    void add(const EdgeView& view, const EdgeView& own, const std::vector<EdgePixel>& pixels) {
+        const Warp warp = warpFrom(view.space->pixelFromWorld * own.space->worldFromPixel);
         for (const EdgePixel& p : pixels) {
-            const SeenAt front = seenAt(views[k], warp, p, p.front);
-            if (const auto off = pixelsOff(views[k], front)) found.off.push_back(*off);
+            const SeenAt at = seenAt(view, warp, p, p.front);
+            if (const auto apart = pixelsOff(view, at)) off.push_back(*apart);
             const float same = std::min(kSameSurface, kSameOfJump * (p.front - p.back) /
                                                           own.space->axis.relativeScale(p.front));
-            const auto onFront = colourIn(views[k], front, same);
-            const auto onBack = colourIn(views[k], seenAt(views[k], warp, p, p.back), same);
+            const auto onFront = colourIn(view, at, same);
+            const auto onBack = colourIn(view, seenAt(view, warp, p, p.back), same);
             if (!onFront || !onBack) continue;
-            const glm::vec3 colour(own.texture->at(p.x, p.y));
-            ++found.asked;
-            found.front += glm::distance(*onFront, colour) < glm::distance(*onBack, colour);
+            ++asked;
+            front += glm::distance(*onFront, p.colour) < glm::distance(*onBack, p.colour);
         }
     }
-    return found;
-}
+};
 
 /// Whether other views deny that edges are fat: they have the colours of the pixels there on the
 /// surface in front rather than on the one behind, or edges in just the same places.
 bool othersShowTheFront(std::span<const EdgeView> views) {
     const std::size_t every = std::max<std::size_t>(1, views.size() / kWitnesses);
+    const auto count = static_cast<std::int64_t>(views.size());
+    std::vector<std::vector<EdgePixel>> pixels(views.size());
+    parallelFor(0, count, [&](std::int64_t i) {
+        pixels[static_cast<std::size_t>(i)] = edgePixels(views[static_cast<std::size_t>(i)]);
+    });
+    // Each view is looked at by itself, for those that ask it: every so many.
     std::vector<Witnesses> all(views.size());
-    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t number) {
-        const auto i = static_cast<std::size_t>(number);
-        all[i] = witnessesOf(views, i, every);
+    parallelFor(0, count, [&](std::int64_t number) {
+        const auto k = static_cast<std::size_t>(number);
+        for (std::size_t i = k % every; i < views.size(); i += every)
+            if (i != k) all[k].add(views[k], views[i], pixels[i]);
     });
     Witnesses sum;
     for (const Witnesses& one : all) {
@@ -385,7 +403,7 @@ bool edgesAreFat(float colour) {
     return colour < kFat;
 }
 
-int thinFatEdges(std::span<const EdgeView> views) {
+int thinFatEdges(std::span<const EdgeView> views, PixelSpool* spool) {
     int round = 0;
     for (; round < kMostRounds && edgesAreFat(colourAtEdges(views)) && !othersShowTheFront(views);
          ++round) {
@@ -394,12 +412,15 @@ int thinFatEdges(std::span<const EdgeView> views) {
         for (const EdgeView& view : views) {
             before.push_back(view.q);
             eroded.push_back(thinned(view, true));
+            eroded.back().moveTo(spool);
         }
         for (const Image<float>& q : eroded) after.push_back(&q);
         const auto apart = disagreement(views, before), closer = disagreement(views, after);
         const bool everywhere = apart && closer && *closer < kClearlyCloser * *apart;
-        for (std::size_t i = 0; i < views.size(); ++i)
+        for (std::size_t i = 0; i < views.size(); ++i) {
             *views[i].q = everywhere ? std::move(eroded[i]) : thinned(views[i], false);
+            views[i].q->moveTo(spool);
+        }
     }
     return round;
 }

@@ -36,7 +36,7 @@ struct EdgeView {
 /// surface in front stay. A filter that gives each pixel the nearest depth around it moves slopes
 /// towards the camera, too: where the views agree clearly better on their surfaces then, every
 /// pixel gets the farthest depth around it instead. Gives by how many pixels; 0 = nothing was
-/// changed. The same on any number of threads.
-int thinFatEdges(std::span<const EdgeView> views);
+/// changed. New q of each view are in `spool`, if any. The same on any number of threads.
+int thinFatEdges(std::span<const EdgeView> views, PixelSpool* spool = nullptr);
 
 }  // namespace stx

@@ -168,15 +168,22 @@ class SharedColoursFinder {
           colours_(cameras.size()),
           dropped_(cameras.size()) {}
 
-    Result<std::vector<SharedColours>> find() {
-        if (!known_) STX_CHECK(each_([&](std::size_t v) { points_[v] = samples_.pointsOf(v); }));
+    /// Nothing where not all views were looked at.
+    Result<std::optional<std::vector<SharedColours>>> find() {
+        if (!known_) {
+            STX_TRY(const bool all,
+                    each_([&](std::size_t v) { points_[v] = samples_.pointsOf(v); }));
+            if (!all) return std::nullopt;
+        }
         // How much of each view another shows.
-        STX_CHECK(each_([&](std::size_t at) {
-            for (std::size_t v = 0; v < points_.size(); ++v)
-                if (v != at) keeps_ ? rankAndKeep(at, v) : rank(at, v);
-        }));
+        STX_TRY(const bool ranked, each_([&](std::size_t at) {
+                    for (std::size_t v = 0; v < points_.size(); ++v)
+                        if (v != at) keeps_ ? rankAndKeep(at, v) : rank(at, v);
+                }));
+        if (!ranked) return std::nullopt;
         auto pairs = pairsThatShare(shown_);
-        STX_CHECK(findMissing(pairs));
+        STX_TRY(const bool found, findMissing(pairs));
+        if (!found) return std::nullopt;
         // Both ways: what is shown at a point is a little blurred beside the point's own colour.
         for (SharedColours& pair : pairs) {
             for (const ColourAt& b : colours_[pair.b][pair.a])
@@ -237,8 +244,8 @@ class SharedColoursFinder {
                 found.push_back({static_cast<std::uint32_t>(k), *colour});
         return found;
     }
-    /// Looks for those of the pairs that were not kept.
-    Result<void> findMissing(const std::vector<SharedColours>& pairs) {
+    /// Looks for those of the pairs that were not kept. Gives what EachView does.
+    Result<bool> findMissing(const std::vector<SharedColours>& pairs) {
         std::vector<std::vector<std::size_t>> missing(points_.size());
         bool any = false;
         for (const SharedColours& pair : pairs) {
@@ -248,7 +255,7 @@ class SharedColoursFinder {
                 any = true;
             }
         }
-        if (!any) return {};
+        if (!any) return true;
         return each_([&](std::size_t at) {
             for (const std::size_t v : missing[at]) colours_[at][v] = coloursOf(v, at);
         });
@@ -268,31 +275,35 @@ class SharedColoursFinder {
     std::atomic<std::int64_t> keptBytes_ = 0;
 };
 
-Result<std::vector<ColourMap>> mapsOf(std::span<const Camera> cameras, const PartOfView& partOf,
-                                      const EachView& each, bool keeps, const ColourPoints* known) {
+Result<std::optional<std::vector<ColourMap>>> mapsOf(std::span<const Camera> cameras,
+                                                     const PartOfView& partOf, const EachView& each,
+                                                     bool keeps, const ColourPoints* known) {
     STX_TRY(auto pairs, SharedColoursFinder(cameras, partOf, each, 1, keeps, known).find());
+    if (!pairs) return std::nullopt;
     std::size_t most = 0;
-    for (const SharedColours& pair : pairs) most = std::max(most, pair.points.size());
+    for (const SharedColours& pair : *pairs) most = std::max(most, pair.points.size());
     if (most < kFewInside) {
         STX_TRY(pairs, SharedColoursFinder(cameras, partOf, each, 0, keeps).find());
+        if (!pairs) return std::nullopt;
     }
-    return matchColours(cameras.size(), pairs);
+    return matchColours(cameras.size(), *pairs);
 }
 
 }  // namespace
 
 std::vector<ColourMap> exposureMaps(std::span<const Camera> cameras, const PartOfView& partOf) {
-    const auto each = [&](const std::function<void(std::size_t)>& body) -> Result<void> {
+    const auto each = [&](const std::function<void(std::size_t)>& body) -> Result<bool> {
         parallelFor(0, static_cast<std::int64_t>(cameras.size()),
                     [&](std::int64_t v) { body(static_cast<std::size_t>(v)); });
-        return {};
+        return true;
     };
-    return *mapsOf(cameras, partOf, each, false, nullptr);  // nothing in it fails
+    return **mapsOf(cameras, partOf, each, false, nullptr);  // nothing in it fails or ends
 }
 
-Result<std::vector<ColourMap>> exposureMaps(std::span<const Camera> cameras,
-                                            const PartOfView& partOf, const EachView& each,
-                                            const ColourPoints* known) {
+Result<std::optional<std::vector<ColourMap>>> exposureMaps(std::span<const Camera> cameras,
+                                                           const PartOfView& partOf,
+                                                           const EachView& each,
+                                                           const ColourPoints* known) {
     return mapsOf(cameras, partOf, each, true, known);
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -49,15 +50,16 @@ using ColourPoints = std::vector<std::vector<ColourPoint>>;
 [[nodiscard]] std::vector<ColourPoint> colourPointsOf(const ReferenceView& view);
 
 /// Calls its argument with the number of each view, from any thread; `PartOfView` is asked for that
-/// view alone meanwhile.
-using EachView = std::function<Result<void>(const std::function<void(std::size_t view)>& body)>;
+/// view alone meanwhile. Gives false where it did not look at all of them, because the maps are not
+/// needed any more.
+using EachView = std::function<Result<bool>(const std::function<void(std::size_t view)>& body)>;
 /// The same of views that are not all there at a time: `each` is called twice, where very many
 /// views show the same three times; where views have few points inside of surfaces twice as often.
-/// Once less where colourPointsOf() all views are `known`. Errors: those of `each`.
-[[nodiscard]] Result<std::vector<ColourMap>> exposureMaps(std::span<const Camera> cameras,
-                                                          const PartOfView& partOf,
-                                                          const EachView& each,
-                                                          const ColourPoints* known = nullptr);
+/// Once less where colourPointsOf() all views are `known`. Nothing where `each` gave false, after
+/// which it is not called again. Errors: those of `each`.
+[[nodiscard]] Result<std::optional<std::vector<ColourMap>>> exposureMaps(
+    std::span<const Camera> cameras, const PartOfView& partOf, const EachView& each,
+    const ColourPoints* known = nullptr);
 
 /// Applies a map to the texels from (x0, y0) to (x1, y1), the last excluded, but for transparent
 /// ones; the report gets the pixels that changed, and by how much (a share of white).

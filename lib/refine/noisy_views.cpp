@@ -1,5 +1,6 @@
 #include "lib/refine/noisy_views.hpp"
 
+#include "lib/base/parallel.hpp"
 #include "lib/geometry/near_views.hpp"
 
 namespace stx {
@@ -31,6 +32,14 @@ std::vector<std::size_t> nearViews(std::span<const NoisyView> views, std::size_t
     return nearViews(
         views.size(), [&](std::size_t i) -> const Camera& { return views[i].space->camera; },
         number, middleOf(views[number]), most);
+}
+
+void forRows(const Image<float>& of, PixelSpool* spool, const std::function<void(int)>& body) {
+    constexpr std::int64_t kRows = 16;
+    parallelForBlocks(0, of.height(), kRows, [&](std::int64_t first, std::int64_t last) {
+        if (spool) spool->settle();
+        for (int y = static_cast<int>(first); y < last; ++y) body(y);
+    });
 }
 
 std::vector<Partner> partnersOf(std::span<const NoisyView> views, std::size_t number) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,10 @@ struct ShownSurface {
 /// geometry.
 [[nodiscard]] std::vector<std::size_t> nearViews(std::span<const NoisyView> views,
                                                  std::size_t number, std::size_t most);
+
+/// parallelForBlocks() over the rows of a view that is compared with others: what is in use of a
+/// spool, if any, comes from many views, and is given back where it becomes too much.
+void forRows(const Image<float>& of, PixelSpool* spool, const std::function<void(int row)>& body);
 
 /// A view that another is compared with.
 struct Partner {

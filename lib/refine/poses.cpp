@@ -10,12 +10,12 @@
 
 namespace stx {
 
-Result<RefineStepReport> alignPoses(Bundle& bundle, Job& job) {
+Result<RefineStepReport> alignPoses(Bundle& bundle, PixelSpool* spool, Job& job) {
     RefineStepReport report;
     const double start = processMilliseconds();
     std::vector<Camera> before;
     for (const ReferenceView& view : bundle.views) before.push_back(view.camera);
-    STX_TRY(const PoseRefinement done, refinePoses(bundle, {}, job));
+    STX_TRY(const PoseRefinement done, refinePoses(bundle, {}, job, spool));
     report.milliseconds = processMilliseconds() - start;
     if (done.before.pairs == 0) {
         job.note("the poses stay as they are: no two views overlap");

@@ -226,14 +226,15 @@ std::string RefineReport::text() const {
     return out;
 }
 
-Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings, Job& job) {
-    STX_CHECK(bundle.check());
-    STX_CHECK(checkPeak(peak::kRefine, bundle.views, job.limits));
+namespace {
+
+Result<RefineReport> refineIn(const RefineRoom& room, Bundle& bundle,
+                              const RefineSettings& settings, Job& job) {
     RefineReport report, ofAll;
     RefineSettings once = settings;
     for (const ReferenceView& view : bundle.views) once = once.after(view.refined);
     if (once.on(poses)) {
-        STX_TRY(ofAll.of(poses), alignPoses(bundle, job));
+        STX_TRY(ofAll.of(poses), alignPoses(bundle, room.spool, job));
     }
     report.add(ofAll);
     // What is behind everything is of other times: it says nothing of what is in front.
@@ -251,7 +252,7 @@ Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings, Job&
             matchExposure(part, ofPart.of(exposure));
         std::vector<RefineView> views;
         for (ReferenceView* view : part) views.push_back({view, &view->texture, &view->depth});
-        auto refined = refineDepth(views, left, ofPart);
+        auto refined = refineDepth(views, left, ofPart, room);
         report.add(ofPart);
         ofPart.add(ofAll);
         for (std::size_t i = 0; i < part.size(); ++i) {
@@ -262,6 +263,24 @@ Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings, Job&
     }
     if (report.changed() && bundle.bounds) bundle.bounds = bundle.computeBounds();
     return report;
+}
+
+}  // namespace
+
+Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings, Job& job) {
+    STX_CHECK(bundle.check());
+    STX_CHECK(checkPeak(peak::kRefine, bundle.views, job.limits));
+    return refineIn({}, bundle, settings, job);
+}
+
+Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings, PixelSpool& spool,
+                            Job& job) {
+    STX_CHECK(bundle.check());
+    std::uint64_t largest = 0;
+    for (const ReferenceView& view : bundle.views)
+        largest = std::max<std::uint64_t>(largest, view.depth.count());
+    STX_TRY(const RefineRoom room, roomIn(spool, largest, job.limits));
+    return refineIn(room, bundle, settings, job);
 }
 
 }  // namespace stx

@@ -152,5 +152,10 @@ struct RefineReport {
 /// refined before (ViewHeader::refined). Steps of RefineWhen::import are passed over. The same on
 /// any number of threads. Errors: a bundle that fails check(), cancelled.
 [[nodiscard]] Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings, Job& job);
+/// The same of a bundle whose images are in a spool, where new ones go, too, as does what is known
+/// of all views meanwhile: memory is taken for as many views as are worked on at a time, one for
+/// each thread where the limit has room for them. The spool must outlive the bundle.
+[[nodiscard]] Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings,
+                                          PixelSpool& spool, Job& job);
 
 }  // namespace stx

@@ -10,6 +10,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
 #include "lib/geometry/pixel_space.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/refine/agree.hpp"
 #include "lib/refine/align.hpp"
 #include "lib/refine/colours.hpp"
@@ -20,7 +21,7 @@
 #include "lib/refine/pinholes.hpp"
 #include "lib/refine/silhouettes.hpp"
 #include "lib/refine/strays.hpp"
-#include "lib/registration/disagreement.hpp"
+#include "lib/registration/disagreement_by_view.hpp"
 
 namespace stx {
 namespace {
@@ -147,8 +148,12 @@ void doubtAlike(NoisyView& n, const Work& w, float doubt) {
 /// What a step changes in the views, by comparing them before and after it.
 class Changes {
   public:
-    Changes(std::span<Work> works, RefineStepReport& report) : works_(works), report_(report) {
-        for (const Work& w : works) before_.push_back(w.q);
+    Changes(std::span<Work> works, RefineStepReport& report, PixelSpool* spool)
+        : works_(works), report_(report) {
+        for (const Work& w : works) {
+            before_.push_back(w.q);
+            before_.back().moveTo(spool);
+        }
     }
     ~Changes() {
         double moves = report_.meanMove * static_cast<double>(report_.moved);
@@ -235,16 +240,218 @@ std::optional<Image<float>> depthOf(const RefineView& view, const Work& w) {
     return out;
 }
 
-/// How far views are apart as they are by now, a share of the distance.
-float disagreementOf(std::span<const RefineView> views, std::span<const Work> works) {
-    std::vector<std::optional<Image<float>>> changed(views.size());
-    std::vector<DepthView> now;
-    for (std::size_t k = 0; k < views.size(); ++k) {
-        changed[k] = depthOf(views[k], works[k]);
-        now.push_back({views[k].header, changed[k] ? &*changed[k] : views[k].depth});
+/// The views of one moment while they are refined, step by step.
+class SideBySide {
+  public:
+    SideBySide(std::span<const RefineView> given, const RefineSettings& wanted,
+               RefineReport& report, const RefineRoom& room)
+        : given_(given),
+          settings_(wanted),
+          report_(report),
+          room_(room),
+          views_(given.begin(), given.end()),
+          repaired_(given.size()),
+          works_(given.size()),
+          noise_(given.size(), 0.0f),
+          noisy_(given.size()),
+          out_(given.size()) {
+        for (const RefineView& view : given) settings_ = settings_.after(view.header->refined);
     }
-    return static_cast<float>(measureDepthDisagreement(now).relative);
-}
+
+    std::vector<RefinedView> refined() {
+        for (const Repair& step : kRepairs)
+            if (settings_.on(step.step)) repairAll(step);
+        begin();
+        findNoise();
+        if (settings_.on(RefineStep::pinholes)) closePinholes();
+        for (Work& w : works_) w.covered = {};
+        smooth();
+        if (settings_.on(RefineStep::edges)) thinEdges();
+        // Noise from pixel to pixel; other errors of a sensor are smooth, and only other views
+        // tell.
+        const bool grainy =
+            std::ranges::any_of(noisy_, [](const NoisyView& n) { return n.left > 0; });
+        if (!grainy) doubtWhatDisagrees();
+        agree(grainy);
+        if (report_.changed())
+            ofEach([&](std::size_t k) {
+                out_[k].depth = depthOf(given_[k], works_[k]);
+                works_[k].q = {};
+                if (out_[k].depth) out_[k].depth->moveTo(room_.spool);
+            });
+        return std::move(out_);
+    }
+
+  private:
+    /// Some at a time, if there is no room for any number of them.
+    template <class Call>
+    void ofEach(const Call& call) {
+        const auto count = static_cast<std::int64_t>(views_.size());
+        const std::int64_t most = room_.atOnce > 0 ? room_.atOnce : count;
+        for (std::int64_t first = 0; first < count; first += most)
+            parallelFor(first, std::min(first + most, count), [&](std::int64_t i) {
+                if (room_.spool) room_.spool->settle();
+                call(static_cast<std::size_t>(i));
+            });
+    }
+
+    void repairAll(const Repair& step) {
+        const Clock clock(report_.of(step.step));
+        std::vector<RefineStepReport> found(views_.size());
+        ofEach([&](std::size_t k) {
+            found[k] = repair(step, views_[k], repaired_[k]);
+            repaired_[k].moveTo(room_.spool);
+        });
+        for (const RefineStepReport& ofView : found) report_.of(step.step).add(ofView);
+    }
+
+    void begin() {
+        ofEach([&](std::size_t k) {
+            Work& w = works_[k];
+            w = workOn(views_[k]);
+            // What was taken away is not empty space.
+            for (std::size_t i = 0; views_[k].depth != given_[k].depth && i < w.q.count(); ++i)
+                if (hasPoint(given_[k].depth->data()[i]) && !hasPoint(views_[k].depth->data()[i]))
+                    w.q.data()[i] = -1.0f;
+            w.q.moveTo(room_.spool);
+            w.covered.moveTo(room_.spool);
+            out_[k].lost = report_.of(RefineStep::mixed).views > 0;
+            out_[k].refined = views_[k].header->refined;
+        });
+    }
+
+    void findNoise() {
+        const Clock clock(report_.of(RefineStep::noise));
+        ofEach([&](std::size_t k) { noise_[k] = depthNoise(works_[k].q, works_[k].space.axis); });
+        settleNoise(works_, noise_);
+        report_.noise = noise_.empty() ? 0.0 : *std::max_element(noise_.begin(), noise_.end());
+    }
+
+    void closePinholes() {
+        RefineStepReport& report = report_.of(RefineStep::pinholes);
+        const Clock clock(report);
+        std::vector<std::int64_t> closed(views_.size());
+        ofEach([&](std::size_t k) {
+            Work& w = works_[k];
+            closed[k] = closeMissedPixels(w.q, w.covered, w.space.axis, noise_[k]);
+        });
+        for (const std::int64_t pixels : closed) {
+            report.views += pixels > 0;
+            report.pixels += pixels;
+        }
+    }
+
+    void smooth() {
+        bool some = false;
+        for (std::size_t k = 0; k < views_.size(); ++k)
+            some = some || isNoisy(noise_[k], works_[k].space.axis);
+        if (some && settings_.on(RefineStep::noise)) {
+            const Clock clock(report_.of(RefineStep::noise));
+            const Changes changes(works_, report_.of(RefineStep::noise), room_.spool);
+            ofEach([&](std::size_t k) {
+                NoisyView& n = noisy_[k];
+                n.left = smoothDepth(works_[k].q, works_[k].space.axis, noise_[k], &n.surface);
+                n.surface.moveTo(room_.spool);
+            });
+        }
+        ofEach([&](std::size_t k) {
+            noisy_[k].space = &works_[k].space;
+            noisy_[k].texture = views_[k].texture;
+            noisy_[k].q = &works_[k].q;
+            if (const float left = views_[k].header->refined.doubt; left > 0) doubt(k, left);
+        });
+    }
+
+    /// Every pixel of a view may be off by the same share.
+    void doubt(std::size_t k, float share) {
+        doubtAlike(noisy_[k], works_[k], share);
+        noisy_[k].surface.moveTo(room_.spool);
+    }
+
+    void thinEdges() {
+        const Clock clock(report_.of(RefineStep::edges));
+        std::vector<EdgeView> edges;
+        for (std::size_t k = 0; k < views_.size(); ++k)
+            edges.push_back({&works_[k].space, views_[k].texture, &works_[k].q,
+                             stepOf(*views_[k].header),
+                             isNoisy(noise_[k], works_[k].space.axis) ? noise_[k] : 0.0f});
+        report_.ownColour = colourAtEdges(edges);
+        if (!edgesAreFat(static_cast<float>(report_.ownColour))) return;
+        const Changes changes(works_, report_.of(RefineStep::edges), room_.spool);
+        thinFatEdges(edges, room_.spool);
+    }
+
+    /// Captured views that disagree are off by that.
+    void doubtWhatDisagrees() {
+        if (!settings_.on(RefineStep::agree) || views_.size() < 2 ||
+            !std::ranges::all_of(views_, isCaptured))
+            return;
+        const Clock clock(report_.of(RefineStep::agree));
+        const float share = kDoubtOfDisagreement * disagreement();
+        ofEach([&](std::size_t k) {
+            if (isNoisy(share, works_[k].space.axis)) doubt(k, share);
+        });
+    }
+
+    /// How far views are apart as they are by now, a share of the distance.
+    float disagreement() {
+        Bundle headers;
+        for (const RefineView& view : views_)
+            static_cast<ViewHeader&>(headers.views.emplace_back()) = *view.header;
+        DisagreementByView found(views_.size());
+        const auto ofDepths = [&](const auto& call) {
+            ofEach([&](std::size_t k) {
+                const auto changed = depthOf(views_[k], works_[k]);
+                call(k, changed ? *changed : *views_[k].depth);
+            });
+        };
+        ofDepths([&](std::size_t k, const Image<float>& depth) { found.sample(k, depth); });
+        ofDepths([&](std::size_t k, const Image<float>& depth) {
+            (void)found.compare(k, depth, headers);
+        });
+        return static_cast<float>(found.result().relative);
+    }
+
+    /// The steps of noisy views.
+    void agree(bool grainy) {
+        std::vector<std::size_t> numbers;
+        std::vector<NoisyView> noisy;
+        for (std::size_t k = 0; k < views_.size(); ++k) {
+            if (!(noisy_[k].left > 0)) continue;
+            numbers.push_back(k);
+            noisy.push_back(std::move(noisy_[k]));
+        }
+        if (noisy.empty()) return;
+        PixelSpool* const spool = room_.spool;
+        const auto step = [&](RefineStep s, const auto& call) {
+            if (!settings_.on(s)) return;
+            const Clock clock(report_.of(s));
+            const Changes changes(works_, report_.of(s), spool);
+            call();
+        };
+        const auto silhouettes = [&] { keepInSilhouettes(noisy, kLevels, spool); };
+        if (grainy) step(RefineStep::silhouettes, silhouettes);
+        step(RefineStep::agree, [&] { agreeOnDepth(noisy, spool); });
+        if (grainy) {
+            step(RefineStep::colours, [&] { agreeOnColours(noisy, spool); });
+            step(RefineStep::silhouettes, silhouettes);
+            step(RefineStep::strays, [&] { removeStrays(noisy, spool); });
+        }
+        for (std::size_t n = 0; n < noisy.size(); ++n)
+            out_[numbers[n]].refined.doubt = noisy[n].left;
+    }
+
+    std::span<const RefineView> given_;
+    RefineSettings settings_;
+    RefineReport& report_;
+    RefineRoom room_;
+    std::vector<RefineView> views_;
+    std::vector<Image<float>> repaired_;
+    std::vector<Work> works_;
+    std::vector<float> noise_;
+    std::vector<NoisyView> noisy_;
+    std::vector<RefinedView> out_;
+};
 
 }  // namespace
 
@@ -259,121 +466,17 @@ void RefinedView::giveTo(ViewHeader& view) const {
     }
 }
 
-std::vector<RefinedView> refineDepth(std::span<const RefineView> given,
-                                     const RefineSettings& wanted, RefineReport& report) {
-    std::vector<RefineView> views(given.begin(), given.end());
-    RefineSettings settings = wanted;
-    for (const RefineView& view : views) settings = settings.after(view.header->refined);
-    const auto count = static_cast<std::int64_t>(views.size());
-    std::vector<Image<float>> repaired(views.size());
-    std::vector<Work> works(views.size());
-    std::vector<NoisyView> noisyViews(views.size());
-    std::vector<RefinedView> out(views.size());
-    std::vector<float> noise(views.size(), 0.0f);
-    const auto ofEach = [&](const auto& call) {
-        parallelFor(0, count, [&](std::int64_t i) { call(static_cast<std::size_t>(i)); });
-    };
-    for (const Repair& step : kRepairs) {
-        if (!settings.on(step.step)) continue;
-        const Clock clock(report.of(step.step));
-        std::vector<RefineStepReport> found(views.size());
-        ofEach([&](std::size_t k) { found[k] = repair(step, views[k], repaired[k]); });
-        for (const RefineStepReport& ofView : found) report.of(step.step).add(ofView);
-    }
-    ofEach([&](std::size_t k) {
-        works[k] = workOn(views[k]);
-        // What was taken away is not empty space.
-        for (std::size_t i = 0; views[k].depth != given[k].depth && i < works[k].q.count(); ++i)
-            if (hasPoint(given[k].depth->data()[i]) && !hasPoint(views[k].depth->data()[i]))
-                works[k].q.data()[i] = -1.0f;
-        out[k].lost = report.of(RefineStep::mixed).views > 0;
-    });
-    {
-        const Clock clock(report.of(RefineStep::noise));
-        ofEach([&](std::size_t k) { noise[k] = depthNoise(works[k].q, works[k].space.axis); });
-        settleNoise(works, noise);
-    }
-    report.noise = views.empty() ? 0.0 : *std::max_element(noise.begin(), noise.end());
-    if (settings.on(RefineStep::pinholes)) {
-        const Clock clock(report.of(RefineStep::pinholes));
-        std::vector<std::int64_t> closed(views.size());
-        ofEach([&](std::size_t k) {
-            closed[k] =
-                closeMissedPixels(works[k].q, works[k].covered, works[k].space.axis, noise[k]);
-        });
-        for (const std::int64_t pixels : closed) {
-            report.of(RefineStep::pinholes).views += pixels > 0;
-            report.of(RefineStep::pinholes).pixels += pixels;
-        }
-    }
-    bool someNoisy = false;
-    for (std::size_t k = 0; k < views.size(); ++k)
-        someNoisy = someNoisy || isNoisy(noise[k], works[k].space.axis);
-    if (someNoisy && settings.on(RefineStep::noise)) {
-        const Clock clock(report.of(RefineStep::noise));
-        const Changes changes(works, report.of(RefineStep::noise));
-        ofEach([&](std::size_t k) {
-            NoisyView& n = noisyViews[k];
-            n.left = smoothDepth(works[k].q, works[k].space.axis, noise[k], &n.surface);
-        });
-    }
-    ofEach([&](std::size_t k) {
-        if (const float left = views[k].header->refined.doubt; left > 0)
-            doubtAlike(noisyViews[k], works[k], left);
-        noisyViews[k].space = &works[k].space;
-        noisyViews[k].texture = views[k].texture;
-        noisyViews[k].q = &works[k].q;
-    });
-    std::vector<EdgeView> edges;
-    for (std::size_t k = 0; k < views.size(); ++k)
-        edges.push_back({&works[k].space, views[k].texture, &works[k].q, stepOf(*views[k].header),
-                         isNoisy(noise[k], works[k].space.axis) ? noise[k] : 0.0f});
-    if (settings.on(RefineStep::edges)) {
-        const Clock clock(report.of(RefineStep::edges));
-        report.ownColour = colourAtEdges(edges);
-        if (edgesAreFat(static_cast<float>(report.ownColour))) {
-            const Changes changes(works, report.of(RefineStep::edges));
-            thinFatEdges(edges);
-        }
-    }
-    // Noise from pixel to pixel; other errors of a sensor are smooth, and only other views tell.
-    const bool grainy =
-        std::ranges::any_of(noisyViews, [](const NoisyView& n) { return n.left > 0; });
-    if (!grainy && settings.on(RefineStep::agree) && views.size() > 1 &&
-        std::ranges::all_of(views, isCaptured)) {
-        const Clock clock(report.of(RefineStep::agree));
-        const float doubt = kDoubtOfDisagreement * disagreementOf(views, works);
-        for (std::size_t k = 0; k < views.size(); ++k)
-            if (isNoisy(doubt, works[k].space.axis)) doubtAlike(noisyViews[k], works[k], doubt);
-    }
-    std::vector<std::size_t> noisyOnes;
-    std::vector<NoisyView> noisy;
-    for (std::size_t k = 0; k < views.size(); ++k) {
-        if (!(noisyViews[k].left > 0)) continue;
-        noisyOnes.push_back(k);
-        noisy.push_back(std::move(noisyViews[k]));
-    }
-    if (!noisy.empty()) {
-        const auto step = [&](RefineStep s, const auto& call) {
-            if (!settings.on(s)) return;
-            const Clock clock(report.of(s));
-            const Changes changes(works, report.of(s));
-            call();
-        };
-        const auto silhouettes = [&] { keepInSilhouettes(noisy, kLevels); };
-        if (grainy) step(RefineStep::silhouettes, silhouettes);
-        step(RefineStep::agree, [&] { agreeOnDepth(noisy); });
-        if (grainy) {
-            step(RefineStep::colours, [&] { agreeOnColours(noisy); });
-            step(RefineStep::silhouettes, silhouettes);
-            step(RefineStep::strays, [&] { removeStrays(noisy); });
-        }
-    }
-    for (std::size_t k = 0; k < views.size(); ++k) out[k].refined = views[k].header->refined;
-    for (std::size_t n = 0; n < noisy.size(); ++n) out[noisyOnes[n]].refined.doubt = noisy[n].left;
-    if (report.changed())
-        ofEach([&](std::size_t k) { out[k].depth = depthOf(given[k], works[k]); });
-    return out;
+Result<RefineRoom> roomIn(PixelSpool& spool, std::uint64_t largest, const Limits& limits) {
+    STX_CHECK(checkPeak(peak::kRefine, largest, largest, 0, limits));
+    const std::uint64_t views =
+        limits.maxMemoryBytes / (peak::kRefine.perPixel * std::max<std::uint64_t>(largest, 1));
+    return RefineRoom{&spool, static_cast<std::int64_t>(std::min<std::uint64_t>(views, 1 << 20))};
+}
+
+std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
+                                     const RefineSettings& settings, RefineReport& report,
+                                     const RefineRoom& room) {
+    return SideBySide(views, settings, report, room).refined();
 }
 
 void RefineNeeds::add(const RefineView& view) {
@@ -403,7 +506,11 @@ void RefineNeeds::add(const RefineNeeds& others) {
 }
 
 bool RefineNeeds::any() const {
-    return some_ || noisyPoints_ >= kFewestNoisy || edgesAreFat(colourAtEdges(edgeShares_));
+    return surely() || edgesAreFat(colourAtEdges(edgeShares_));
+}
+
+bool RefineNeeds::surely() const {
+    return some_ || noisyPoints_ >= kFewestNoisy;
 }
 
 }  // namespace stx

@@ -31,11 +31,24 @@ struct RefinedView {
     void giveTo(ViewHeader& view) const;
 };
 
+/// Where refining keeps what it knows of all views, and on how many it works at a time: in a spool
+/// memory is taken for those alone.
+struct RefineRoom {
+    PixelSpool* spool = nullptr;  ///< null: memory. It must outlive what refineDepth() gives
+    std::int64_t atOnce = 0;      ///< 0: any number
+};
+
+/// The room of a spool, for views of which the largest has so many pixels. Errors (invalidInput):
+/// that one alone takes more than the limit.
+[[nodiscard]] Result<RefineRoom> roomIn(PixelSpool& spool, std::uint64_t largest,
+                                        const Limits& limits);
+
 /// Refines the depth of views of one moment, unless one of them was refined before: see
-/// RefineSettings::after(). The same on any number of threads.
+/// RefineSettings::after(). The same on any number of threads, and in any room.
 [[nodiscard]] std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
                                                    const RefineSettings& settings,
-                                                   RefineReport& report);
+                                                   RefineReport& report,
+                                                   const RefineRoom& room = {});
 
 /// Tells of views that are looked at one by one whether refineDepth() may change one of them: views
 /// in the rectangles of an atlas cost memory to be side by side.
@@ -46,6 +59,8 @@ class RefineNeeds {
     /// What was found of others, with the same settings.
     void add(const RefineNeeds& others);
     [[nodiscard]] bool any() const;
+    /// Whether that is so whatever more views show.
+    [[nodiscard]] bool surely() const;
 
   private:
     RefineSettings settings_;

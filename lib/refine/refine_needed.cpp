@@ -1,6 +1,7 @@
 #include "lib/refine/refine_needed.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <vector>
 
 #include "lib/model/some_views.hpp"
@@ -48,44 +49,46 @@ class PartNeeds {
             STX_CHECK(each([](std::size_t) {}));
             return depth_.any();
         }
+        const EachView eachView = [this](const auto& body) { return each(body); };
         std::vector<Camera> cameras;
         for (const ViewHeader& view : views_->about().views) cameras.push_back(view.camera);
         const auto partOf = [&](std::size_t k, int, int, int, int) {
             const ReferenceView& view = *now_[k];
             return PixelPart{&view.texture, &view.depth, 0, 1, view.camera.width};
         };
-        const auto isKnown = [&] { return depthDone_ && depth_.any(); };
-        const auto eachView = [&](const std::function<void(std::size_t)>& body) -> Result<void> {
-            // Colours need not be looked at any more.
-            if (isKnown()) return fail(ErrorCode::failed, "depth is refined");
-            return each(body);
-        };
         ColourPoints known;
         if (const auto* looked = dynamic_cast<const ViewsLookedAt*>(&table_);
             looked && looked->colourPoints())
             for (const std::size_t i : part_.views) known.push_back((*looked->colourPoints())[i]);
-        auto maps = exposureMaps(cameras, partOf, eachView, known.empty() ? nullptr : &known);
-        if (isKnown()) return true;
-        if (!maps) return propagate(maps);
-        return !std::ranges::all_of(*maps, &ColourMap::changesNothing);
+        STX_TRY(const auto maps,
+                exposureMaps(cameras, partOf, eachView, known.empty() ? nullptr : &known));
+        return !maps || !std::ranges::all_of(*maps, &ColourMap::changesNothing);
     }
 
   private:
-    /// Goes through the views of the part; the first time with a look at their depth.
-    Result<void> each(const std::function<void(std::size_t)>& body) {
+    /// Goes through the views of the part; the first time with a look at their depth. False where
+    /// that is refined: colours need not be looked at any more.
+    Result<bool> each(const std::function<void(std::size_t)>& body) {
         std::vector<RefineNeeds> needs(now_.size(), RefineNeeds(part_.left));
+        std::atomic<bool> enough = false;
         STX_CHECK(forEachView(
             *views_, peak::kRefine, job_,
             [&](std::size_t k, std::shared_ptr<const ReferenceView> view) -> Result<void> {
-                if (!depthDone_) needs[k].add(RefineView{view.get(), &view->texture, &view->depth});
+                if (enough) return {};
+                if (!depthDone_) {
+                    needs[k].add(RefineView{view.get(), &view->texture, &view->depth});
+                    if (needs[k].surely()) enough = true;
+                }
                 now_[k] = std::move(view);
                 body(k);
                 now_[k].reset();
                 return {};
-            }));
+            },
+            {}, [&] { return enough.load(); }));
+        if (depthDone_) return true;
         for (const RefineNeeds& found : needs) depth_.add(found);
         depthDone_ = true;
-        return {};
+        return !depth_.any();
     }
 
     const ViewTable& table_;

@@ -16,9 +16,46 @@ namespace {
 constexpr float kFarthestDoubts = 6.0f;
 constexpr int kPlaces = 16;
 
+/// What a view shows between the middles of four pixels, (x, y) being the last of them.
+enum class Shown : std::uint8_t {
+    object,      ///< of all four alpha is above `free`
+    background,  ///< of all four it is 0
+    outline
+};
+using ShownMap = Image<Shown>;
+
+/// Alpha as far above `free` is above it between pixels, too, whatever rounding does.
+constexpr float kRounding = 1e-4f;
+
+/// One column and row more than the view has.
+ShownMap shownBy(const Texture& texture, float freeLevel) {
+    const int width = texture.width(), height = texture.height();
+    const auto kindOf = [&](int x, int y) {
+        const float a = texture.alpha(static_cast<std::size_t>(y) * width + x);
+        return a >= freeLevel + kRounding ? Shown::object
+               : a > 0.0f                 ? Shown::outline
+                                          : Shown::background;
+    };
+    ShownMap out(width + 1, height + 1);
+    parallelForBlocks(0, out.height(), 32, [&](std::int64_t first, std::int64_t last) {
+        for (int y = static_cast<int>(first); y < last; ++y) {
+            const int above = std::max(y - 1, 0), below = std::min(y, height - 1);
+            for (int x = 0; x <= width; ++x) {
+                const int left = std::max(x - 1, 0), right = std::min(x, width - 1);
+                const Shown a = kindOf(left, above);
+                const bool alike = a == kindOf(right, above) && a == kindOf(left, below) &&
+                                   a == kindOf(right, below);
+                out.at(x, y) = alike ? a : Shown::outline;
+            }
+        }
+    });
+    return out;
+}
+
 /// A view that may see background at a point.
 struct Witness {
     const Texture* texture;
+    const ShownMap* shown;
     int width, height;
     Warp warp;  ///< from the pixels of the view that is looked at
     SilhouetteAlpha level;
@@ -38,8 +75,10 @@ struct Witness {
               v < static_cast<float>(height)))
             return false;
         const float fu = std::floor(u - 0.5f), fv = std::floor(v - 0.5f);
-        const float tx = u - 0.5f - fu, ty = v - 0.5f - fv;
         const int px = static_cast<int>(fu), py = static_cast<int>(fv);
+        const Shown kind = shown->at(px + 1, py + 1);
+        if (kind != Shown::outline) return kind == Shown::background;
+        const float tx = u - 0.5f - fu, ty = v - 0.5f - fv;
         const float a = (alpha(px, py) * (1 - tx) + alpha(px + 1, py) * tx) * (1 - ty) +
                         (alpha(px, py + 1) * (1 - tx) + alpha(px + 1, py + 1) * tx) * ty;
         if (!(a < level.free)) return false;
@@ -65,37 +104,36 @@ bool hasBackground(const Texture& texture, float freeLevel) {
     return false;
 }
 
-Image<float> kept(std::span<const NoisyView> views, const std::vector<bool>& saysAnything,
-                  std::size_t number, const SilhouetteAlpha& alpha) {
+/// `shown`: of each view; empty of those that say nothing.
+Image<float> kept(std::span<const NoisyView> views, std::span<const ShownMap> shown,
+                  std::size_t number, const SilhouetteAlpha& alpha, PixelSpool* spool) {
     const NoisyView& view = views[number];
     std::vector<Witness> witnesses;
     for (std::size_t i = 0; i < views.size(); ++i) {
-        if (i == number || !saysAnything[i]) continue;
-        witnesses.push_back({views[i].texture, views[i].q->width(), views[i].q->height(),
+        if (i == number || shown[i].empty()) continue;
+        witnesses.push_back({views[i].texture, &shown[i], views[i].q->width(), views[i].q->height(),
                              warpFrom(views[i].space->pixelFromWorld * view.space->worldFromPixel),
                              alpha});
     }
     Image<float> out = *view.q;
-    parallelForBlocks(0, out.height(), 16, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y) {
-            for (int x = 0; x < out.width(); ++x) {
-                const float q = view.q->at(x, y), doubt = view.surface.at(x, y).z;
-                if (!(q > 0.0f) || !(doubt > 0.0f)) continue;
-                const float u = static_cast<float>(x) + 0.5f, v = static_cast<float>(y) + 0.5f;
-                int fewest = countOf(witnesses, u, v, q);
-                float best = q;
-                for (int k = 1; k <= 2 * kPlaces && fewest > 0; ++k) {
-                    const auto steps = static_cast<float>((k + 1) / 2);
-                    const float there =
-                        q + (k % 2 ? -1.0f : 1.0f) * steps * (kFarthestDoubts / kPlaces) * doubt;
-                    if (!(there > 0.0f)) continue;
-                    const int count = countOf(witnesses, u, v, there);
-                    if (count >= fewest) continue;
-                    fewest = count;
-                    best = there;
-                }
-                out.at(x, y) = best;
+    forRows(out, spool, [&](int y) {
+        for (int x = 0; x < out.width(); ++x) {
+            const float q = view.q->at(x, y), doubt = view.surface.at(x, y).z;
+            if (!(q > 0.0f) || !(doubt > 0.0f)) continue;
+            const float u = static_cast<float>(x) + 0.5f, v = static_cast<float>(y) + 0.5f;
+            int fewest = countOf(witnesses, u, v, q);
+            float best = q;
+            for (int k = 1; k <= 2 * kPlaces && fewest > 0; ++k) {
+                const auto steps = static_cast<float>((k + 1) / 2);
+                const float there =
+                    q + (k % 2 ? -1.0f : 1.0f) * steps * (kFarthestDoubts / kPlaces) * doubt;
+                if (!(there > 0.0f)) continue;
+                const int count = countOf(witnesses, u, v, there);
+                if (count >= fewest) continue;
+                fewest = count;
+                best = there;
             }
+            out.at(x, y) = best;
         }
     });
     return out;
@@ -103,15 +141,20 @@ Image<float> kept(std::span<const NoisyView> views, const std::vector<bool>& say
 
 }  // namespace
 
-void keepInSilhouettes(std::span<const NoisyView> views, const SilhouetteAlpha& alpha) {
-    std::vector<bool> saysAnything;
-    for (const NoisyView& view : views)
-        saysAnything.push_back(hasBackground(*view.texture, alpha.free));
-    if (std::none_of(saysAnything.begin(), saysAnything.end(), [](bool says) { return says; }))
-        return;
+void keepInSilhouettes(std::span<const NoisyView> views, const SilhouetteAlpha& alpha,
+                       PixelSpool* spool) {
+    std::vector<ShownMap> shown(views.size());
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        if (!hasBackground(*views[i].texture, alpha.free)) continue;
+        shown[i] = shownBy(*views[i].texture, alpha.free);
+        shown[i].moveTo(spool);
+    }
+    if (std::ranges::all_of(shown, &ShownMap::empty)) return;
     std::vector<Image<float>> results;
-    for (std::size_t i = 0; i < views.size(); ++i)
-        results.push_back(kept(views, saysAnything, i, alpha));
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        results.push_back(kept(views, shown, i, alpha, spool));
+        results.back().moveTo(spool);
+    }
     for (std::size_t i = 0; i < views.size(); ++i) *views[i].q = std::move(results[i]);
 }
 

@@ -5,8 +5,6 @@
 #include <utility>
 #include <vector>
 
-#include "lib/base/parallel.hpp"
-
 namespace stx {
 namespace {
 
@@ -72,26 +70,29 @@ bool isSeenPast(const Partner& p, const NoisyView& view, int x, int y) {
 }
 
 /// The strays of one view.
-Image<std::uint8_t> straysOf(std::span<const NoisyView> views, std::size_t number) {
+Image<std::uint8_t> straysOf(std::span<const NoisyView> views, std::size_t number,
+                             PixelSpool* spool) {
     const NoisyView& view = views[number];
     const std::vector<Partner> partners = partnersOf(views, number);
     Image<std::uint8_t> strays(view.q->width(), view.q->height(), 0);
-    parallelForBlocks(0, strays.height(), 16, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y)
-            for (int x = 0; x < strays.width(); ++x)
-                strays.at(x, y) = view.q->at(x, y) > 0.0f && !isOnSurface(view, x, y) &&
-                                  std::ranges::any_of(partners, [&](const Partner& p) {
-                                      return isSeenPast(p, view, x, y);
-                                  });
+    forRows(*view.q, spool, [&](int y) {
+        for (int x = 0; x < strays.width(); ++x)
+            strays.at(x, y) = view.q->at(x, y) > 0.0f && !isOnSurface(view, x, y) &&
+                              std::ranges::any_of(partners, [&](const Partner& p) {
+                                  return isSeenPast(p, view, x, y);
+                              });
     });
     return strays;
 }
 
 }  // namespace
 
-std::int64_t removeStrays(std::span<const NoisyView> views) {
+std::int64_t removeStrays(std::span<const NoisyView> views, PixelSpool* spool) {
     std::vector<Image<std::uint8_t>> strays;
-    for (std::size_t i = 0; i < views.size(); ++i) strays.push_back(straysOf(views, i));
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        strays.push_back(straysOf(views, i, spool));
+        strays.back().moveTo(spool);
+    }
     std::int64_t removed = 0;
     for (std::size_t i = 0; i < views.size(); ++i) {
         for (std::size_t k = 0; k < strays[i].count(); ++k) {

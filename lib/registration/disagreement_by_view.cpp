@@ -102,4 +102,18 @@ DepthDisagreement DisagreementByView::result() const {
     return registration::togetherOf(pairs, found, state_->views.size());
 }
 
+Result<DepthDisagreement> measureDepthDisagreement(const ViewTable& table, Job& job) {
+    DisagreementByView found(table.count());
+    const PeakMemory nothing{"comparing views", 0};
+    STX_CHECK(forEachView(table, nothing, job, [&](std::size_t i, auto view) -> Result<void> {
+        found.sample(i, view->depth);
+        return {};
+    }));
+    STX_CHECK(forEachView(table, nothing, job, [&](std::size_t i, auto view) -> Result<void> {
+        (void)found.compare(i, view->depth, table.about());
+        return {};
+    }));
+    return found.result();
+}
+
 }  // namespace stx

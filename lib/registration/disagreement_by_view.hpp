@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <memory>
 
+#include "lib/base/job.hpp"
+#include "lib/model/view_table.hpp"
 #include "lib/registration/disagreement.hpp"
 
 namespace stx {
@@ -28,5 +30,9 @@ class DisagreementByView {
     struct State;
     std::unique_ptr<State> state_;
 };
+
+/// measureDepthDisagreement() of views that are read one by one, twice. Errors: those of the views,
+/// cancelled.
+[[nodiscard]] Result<DepthDisagreement> measureDepthDisagreement(const ViewTable& table, Job& job);
 
 }  // namespace stx

@@ -172,8 +172,8 @@ double step(Bundle& bundle, const std::vector<Pyramid>& greys, const std::vector
 
 }  // namespace
 
-Result<PoseRefinement> refinePoses(Bundle& bundle, const PoseRefinementSettings& settings,
-                                   Job& job) {
+Result<PoseRefinement> refinePoses(Bundle& bundle, const PoseRefinementSettings& settings, Job& job,
+                                   PixelSpool* spool) {
     PoseRefinement result;
     const auto views = depthViewsOf(bundle);
     const auto pairs = overlappingPairs(views, settings);
@@ -186,6 +186,7 @@ Result<PoseRefinement> refinePoses(Bundle& bundle, const PoseRefinementSettings&
     parallelFor(0, static_cast<std::int64_t>(greys.size()), [&](std::int64_t i) {
         const auto at = static_cast<std::size_t>(i);
         greys[at] = greyPyramid(bundle.views[at].texture);
+        for (Image<float>& level : greys[at]) level.moveTo(spool);
     });
     PoseSystem system(bundle, pairs);
     for (int level = kLevels - 1; level >= 0; --level) {

@@ -27,8 +27,9 @@ struct PoseRefinement {
 /// al., Dense visual SLAM, 2013). The correction is the least that does it: views that overlap with
 /// none, and the frame of the whole, stay. Intrinsics and images stay. Poses that
 /// would make the views disagree more are not kept. The same result on any
-/// number of threads. Errors: cancelled.
+/// number of threads. Grey pictures of all views are in `spool`, if any. Errors: cancelled.
 [[nodiscard]] Result<PoseRefinement> refinePoses(Bundle& bundle,
-                                                 const PoseRefinementSettings& settings, Job& job);
+                                                 const PoseRefinementSettings& settings, Job& job,
+                                                 PixelSpool* spool = nullptr);
 
 }  // namespace stx

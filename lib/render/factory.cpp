@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "lib/refine/refine_depth.hpp"
 #include "lib/render/compose/behind.hpp"
 #include "lib/render/compose/environment_behind.hpp"
 #include "lib/render/compose/fallback.hpp"
@@ -173,13 +174,19 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
     };
     if (settings.mode == RenderMode::splat) settings.refine = settings.refine.forSplats();
     const auto refined = [&](const PageSet& views) -> Result<PageSet> {
+        std::int64_t atOnce = 0;
         if (views.spool()) {
             // What agrees by itself is looked at one by one.
             if (!views.mayRefine(settings.refine)) return views;
-            STX_CHECK(checkPeak(peak::kRefine, views.pixelCount(), 0, 0, job.limits));
+            std::uint64_t largest = 0;
+            for (const PageView& view : views.views())
+                largest = std::max(largest, static_cast<std::uint64_t>(view.camera.width) *
+                                                static_cast<std::uint64_t>(view.camera.height));
+            STX_TRY(const RefineRoom room, roomIn(*views.spool(), largest, job.limits));
+            atOnce = room.atOnce;
         }
         RefineReport report;
-        PageSet better = views.refined(settings.refine, &report);
+        PageSet better = views.refined(settings.refine, &report, atOnce);
         for (const RefineStepInfo& info : refineSteps())
             if (const RefineStepReport& s = report.of(info.step);
                 settings.log && s.milliseconds > 0)

@@ -11,6 +11,8 @@ namespace stx::splats {
 namespace {
 
 constexpr std::size_t kMostViews = 16;
+/// After so many discs it is looked at how much of a spool is in use.
+constexpr std::size_t kLookEvery = 8192;
 /// Discs of one surface lie in each other's plane to within this share of the larger one's side.
 constexpr float kOff = 0.5f;
 constexpr float kLeastCosine = 0.5f;  ///< between their normals
@@ -57,9 +59,9 @@ bool showsFiner(const Camera& camera, const glm::dmat3& cameraFromWorld, const I
 
 }  // namespace
 
-void keepFinest(const Bundle& bundle, std::vector<Image<Disc>>& discs) {
+void keepFinest(const Bundle& bundle, std::vector<Image<Disc>>& discs, PixelSpool* spool) {
     const std::size_t count = bundle.views.size();
-    std::vector<std::vector<std::uint8_t>> gone(count);
+    std::vector<Image<std::uint8_t>> gone(count);
     const auto camera = [&](std::size_t i) -> const Camera& { return bundle.views[i].camera; };
     std::vector<glm::dmat3> turns;
     for (std::size_t i = 0; i < count; ++i)
@@ -67,27 +69,31 @@ void keepFinest(const Bundle& bundle, std::vector<Image<Disc>>& discs) {
     parallelFor(0, static_cast<std::int64_t>(count), [&](std::int64_t number) {
         const auto i = static_cast<std::size_t>(number);
         const Image<Disc>& own = discs[i];
-        gone[i].resize(own.count());
+        Image<std::uint8_t> found(own.width(), own.height(), 0);
         Bounds bounds;
         for (const Disc& d : own.pixels())
             if (d.colour.w > 0) bounds.add(d.centre);
         if (bounds.empty()) return;
+        if (spool) spool->settle();
         auto others = nearViews(count, camera, i, bounds.centre(), kMostViews);
         std::erase_if(others, [&](std::size_t j) {
             return bundle.views[j].background != bundle.views[i].background;
         });
         for (std::size_t p = 0; p < own.count(); ++p) {
+            if (spool && p % kLookEvery == 0) spool->settle();
             const Disc& disc = own.pixels()[p];
             if (!(disc.colour.w > 0)) continue;
             const Shape shape = shapeOf(disc);
-            gone[i][p] = std::ranges::any_of(others, [&](std::size_t j) {
+            found.data()[p] = std::ranges::any_of(others, [&](std::size_t j) {
                 return showsFiner(camera(j), turns[j], discs[j], j < i, disc, shape);
             });
         }
+        found.moveTo(spool);
+        gone[i] = std::move(found);
     });
     for (std::size_t i = 0; i < count; ++i)
-        for (std::size_t p = 0; p < gone[i].size(); ++p)
-            if (gone[i][p]) discs[i].pixels()[p].colour.w = 0;
+        for (std::size_t p = 0; p < gone[i].count(); ++p)
+            if (gone[i].data()[p]) discs[i].data()[p].colour.w = 0;
 }
 
 }  // namespace stx::splats

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 #include <glm/gtc/quaternion.hpp>
 
 #include "lib/base/parallel.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/model/some_views.hpp"
 #include "lib/splats/finest.hpp"
 #include "lib/splats/merge.hpp"
 #include "lib/surface/normals.hpp"
@@ -100,76 +103,159 @@ void setSplat(SplatCloud& cloud, std::size_t i, const Disc& d, glm::dvec3 origin
     cloud.colours[i] = glm::vec3(d.colour);
 }
 
-/// Some view has no axes at all.
-bool lacksAxes(const Bundle& bundle) {
-    return std::ranges::any_of(bundle.views, [](const auto& v) { return !v.hasSplats(); });
+/// Views of the background come first.
+std::vector<std::size_t> orderOf(const Bundle& about) {
+    std::vector<std::size_t> order(about.views.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_partition(order.begin(), order.end(),
+                          [&](std::size_t i) { return about.views[i].background; });
+    return order;
+}
+
+/// The table with axes in each view, if some view has none at all.
+Result<std::unique_ptr<ViewTable>> withAxes(std::unique_ptr<ViewTable> table) {
+    if (std::ranges::all_of(table->kinds(), &ViewImageKinds::hasSplats)) return table;
+    BakeSettings axes;
+    axes.keepNormals = true;
+    STX_TRY(auto bake, bakeOfViews(axes));
+    return changedViews(std::move(table), std::move(bake));
+}
+
+/// The discs of each view that no other shows finer, below the surface.
+Result<std::vector<Image<Disc>>> finestDiscs(const ViewTable& table, const SplatSettings& settings,
+                                             PixelSpool* spool, Job& job) {
+    std::vector<Image<Disc>> images(table.count());
+    STX_CHECK(forEachView(table, {peak::kSplats.what, sizeof(Disc)}, job,
+                          [&](std::size_t i, auto view) -> Result<void> {
+                              images[i] = discsOf(*view);
+                              images[i].moveTo(spool);
+                              return {};
+                          }));
+    splats::keepFinest(std::as_const(table).about(), images, spool);
+    parallelFor(0, static_cast<std::int64_t>(images.size()), [&](std::int64_t i) {
+        if (spool) spool->settle();
+        putBelowSurface(images[static_cast<std::size_t>(i)], settings.pixelsPerTexel);
+    });
+    STX_CHECK(job.checkCancelled());
+    return images;
+}
+
+/// Where the splats of each row begin among those of its image, and at last how many there are.
+std::vector<std::size_t> rowsOf(const Image<Disc>& image) {
+    std::vector<std::size_t> begin{0};
+    for (int y = 0; y < image.height(); ++y)
+        begin.push_back(begin.back() +
+                        static_cast<std::size_t>(std::ranges::count_if(
+                            image.row(y), [](const Disc& d) { return d.colour.w > 0.0f; })));
+    return begin;
+}
+
+/// Discs of one image after the other as splats.
+class CloudMaker {
+  public:
+    CloudMaker(glm::dvec3 origin, double size) : origin_(origin), size_(size) {}
+
+    [[nodiscard]] Result<void> begin(std::size_t count, Job& job) {
+        if (count == 0)
+            return fail(ErrorCode::invalidInput, "the bundle has no points to make splats of");
+        if (count > std::numeric_limits<std::uint32_t>::max())
+            return fail(ErrorCode::invalidInput,
+                        "{} points are more splats than files hold (2^32 - 1)", count);
+        STX_CHECK(cloud.resize(count, 0, job.limits));
+        if (origin_ != glm::dvec3(0.0))
+            job.note(fmt::format(
+                "splats are floats in the world: coordinates near {} {} {} are rounded to them",
+                origin_.x, origin_.y, origin_.z));
+        return {};
+    }
+    void add(const std::vector<Disc>& list) {
+        const std::size_t first = at_;
+        at_ += list.size();
+        parallelForBlocks(
+            0, static_cast<std::int64_t>(list.size()), 4096,
+            [&](std::int64_t from, std::int64_t to) {
+                for (auto i = static_cast<std::size_t>(from); i < static_cast<std::size_t>(to); ++i)
+                    setSplat(cloud, first + i, list[i], origin_, static_cast<float>(size_));
+            });
+    }
+
+    void add(const Image<Disc>& image) {
+        const std::vector<std::size_t> rows = rowsOf(image);
+        const std::size_t first = at_;
+        at_ += rows.back();
+        parallelFor(0, image.height(), [&](std::int64_t y) {
+            std::size_t i = first + rows[static_cast<std::size_t>(y)];
+            for (const Disc& d : image.row(static_cast<int>(y)))
+                if (d.colour.w > 0.0f) setSplat(cloud, i++, d, origin_, static_cast<float>(size_));
+        });
+    }
+
+    SplatCloud cloud;
+
+  private:
+    glm::dvec3 origin_;
+    double size_;
+    std::size_t at_ = 0;
+};
+
+Result<SplatCloud> cloudOf(std::vector<Image<Disc>> images, glm::dvec3 origin,
+                           const SplatSettings& settings, Job& job) {
+    CloudMaker maker(origin, settings.size);
+    if (settings.most == 0) {
+        std::size_t count = 0;
+        for (const Image<Disc>& image : images) count += rowsOf(image).back();
+        STX_CHECK(maker.begin(count, job));
+        for (Image<Disc>& image : images) {
+            maker.add(image);
+            image = {};
+        }
+        return std::move(maker.cloud);
+    }
+    const auto lists = splats::mergeDiscs(std::move(images), settings.most);
+    std::size_t count = 0;
+    for (const auto& list : lists) count += list.size();
+    if (count > settings.most)
+        return fail(ErrorCode::failed,
+                    "flat pieces of one colour merge into {} splats at the least, not into {}; "
+                    "smaller or pruned views have fewer",
+                    count, settings.most);
+    STX_CHECK(maker.begin(count, job));
+    for (const auto& list : lists) maker.add(list);
+    return std::move(maker.cloud);
+}
+
+const PeakMemory& memoryOfSplats(const SplatSettings& settings) {
+    return settings.most > 0 ? peak::kFewerSplats : peak::kSplats;
 }
 
 }  // namespace
 
 Result<SplatCloud> splatsOfBundle(Bundle bundle, const SplatSettings& settings, Job& job) {
-    std::stable_partition(bundle.views.begin(), bundle.views.end(),
-                          [](const auto& v) { return v.background; });
-    STX_CHECK(checkPeak(settings.most > 0 ? peak::kFewerSplats : peak::kSplats, bundle.views,
-                        job.limits));
-    if (lacksAxes(bundle)) {
-        BakeSettings axes;
-        axes.keepNormals = true;
-        STX_CHECK(bake(bundle, axes, job));
-    }
-    std::vector<Image<Disc>> images(bundle.views.size());
-    parallelFor(0, static_cast<std::int64_t>(images.size()), [&](std::int64_t i) {
-        const auto n = static_cast<std::size_t>(i);
-        images[n] = discsOf(bundle.views[n]);
-    });
-    splats::keepFinest(bundle, images);
-    bundle.views.clear();
-    parallelFor(0, static_cast<std::int64_t>(images.size()), [&](std::int64_t i) {
-        putBelowSurface(images[static_cast<std::size_t>(i)], settings.pixelsPerTexel);
-    });
-    STX_CHECK(job.checkCancelled());
-    std::vector<std::vector<Disc>> lists;
-    if (settings.most > 0) {
-        lists = splats::mergeDiscs(std::move(images), settings.most);
-    } else {
-        for (Image<Disc>& image : images) {
-            auto& list = lists.emplace_back();
-            std::ranges::copy_if(image.pixels(), std::back_inserter(list),
-                                 [](const Disc& d) { return d.colour.w > 0.0f; });
-            image = {};
-        }
-    }
-    std::size_t count = 0;
-    for (const auto& list : lists) count += list.size();
-    if (count == 0)
-        return fail(ErrorCode::invalidInput, "the bundle has no points to make splats of");
-    if (count > std::numeric_limits<std::uint32_t>::max())
-        return fail(ErrorCode::invalidInput, "{} points are more splats than files hold (2^32 - 1)",
-                    count);
-    if (settings.most > 0 && count > settings.most)
-        return fail(ErrorCode::failed,
-                    "flat pieces of one colour merge into {} splats at the least, not into {}; "
-                    "smaller or pruned views have fewer",
-                    count, settings.most);
-    SplatCloud cloud;
-    STX_CHECK(cloud.resize(count, 0, job.limits));
-    if (bundle.origin != glm::dvec3(0.0))
-        job.note(fmt::format(
-            "splats are floats in the world: coordinates near {} {} {} are rounded to them",
-            bundle.origin.x, bundle.origin.y, bundle.origin.z));
-    std::size_t at = 0;
-    for (const auto& list : lists) {
-        const std::size_t first = at;
-        at += list.size();
-        parallelForBlocks(0, static_cast<std::int64_t>(list.size()), 4096,
-                          [&](std::int64_t from, std::int64_t to) {
-                              for (auto i = static_cast<std::size_t>(from);
-                                   i < static_cast<std::size_t>(to); ++i)
-                                  setSplat(cloud, first + i, list[i], bundle.origin,
-                                           static_cast<float>(settings.size));
-                          });
-    }
-    return cloud;
+    STX_CHECK(checkPeak(memoryOfSplats(settings), bundle.views, job.limits));
+    STX_CHECK(bundle.check());
+    const glm::dvec3 origin = bundle.origin;
+    const auto table = tableOf(std::move(bundle));
+    STX_TRY(const auto ordered,
+            withAxes(someViewsOf(*table, orderOf(std::as_const(*table).about()))));
+    STX_TRY(auto images, finestDiscs(*ordered, settings, nullptr, job));
+    table->about().views.clear();
+    return cloudOf(std::move(images), origin, settings, job);
+}
+
+Result<SplatCloud> splatsOfViews(const ViewTable& table, const SplatSettings& settings,
+                                 PixelSpool* spool, Job& job) {
+    STX_TRY(const auto ordered, withAxes(someViewsOf(table, orderOf(table.about()))));
+    STX_TRY(auto images, finestDiscs(*ordered, settings, spool, job));
+    return cloudOf(std::move(images), table.about().origin, settings, job);
+}
+
+std::uint64_t memoryOfSpooledSplats(const ViewTable& table, const Limits& limits) {
+    // Of one view its axes and discs; at most all pixels are splats, and written ones are a copy.
+    constexpr PeakMemory kOfOne = {peak::kSplats.what, 2 * sizeof(Disc) + 40};
+    std::uint64_t pixels = 0;
+    for (std::size_t i = 0; i < table.count(); ++i) pixels += table.pixelsOf(i);
+    return std::max(memoryFromSpool(table, kOfOne, limits),
+                    limits.maxMemoryBytes / kSpoolPart + pixels * SplatCloud::bytesEach(0));
 }
 
 }  // namespace stx

@@ -3,6 +3,7 @@
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/splat_cloud.hpp"
+#include "lib/model/view_table.hpp"
 
 namespace stx {
 
@@ -30,5 +31,13 @@ struct SplatSettings {
 /// not come down to `most`, with the least that they come to; memory over the limit, cancelled.
 [[nodiscard]] Result<SplatCloud> splatsOfBundle(Bundle bundle, const SplatSettings& settings,
                                                 Job& job);
+/// The same of views that are read one by one. What is known of each pixel is in a spool, if any,
+/// with `most` 0 only: then memory is taken for one view for each thread, and for the cloud.
+/// Errors: also those of the views.
+[[nodiscard]] Result<SplatCloud> splatsOfViews(const ViewTable& table,
+                                               const SplatSettings& settings, PixelSpool* spool,
+                                               Job& job);
+/// Memory that it takes with a spool, what that holds included, bytes.
+[[nodiscard]] std::uint64_t memoryOfSpooledSplats(const ViewTable& table, const Limits& limits);
 
 }  // namespace stx

@@ -133,9 +133,10 @@ class PageSet {
     /// Whether refined() may change something. Looks at one view after the other.
     [[nodiscard]] bool mayRefine(const RefineSettings& settings) const;
     /// The same with the depth of its views refined, those behind it not: the very same where depth
-    /// is exact. `report`, if any, tells what was found and changed.
-    [[nodiscard]] PageSet refined(const RefineSettings& settings,
-                                  RefineReport* report = nullptr) const;
+    /// is exact. `report`, if any, tells what was found and changed. Works on `atOnce` views at a
+    /// time (RefineRoom); 0: any number.
+    [[nodiscard]] PageSet refined(const RefineSettings& settings, RefineReport* report = nullptr,
+                                  std::int64_t atOnce = 0) const;
     /// The same before another background, behind its own: what views with measured depth show
     /// without it, where that could be found, else far away (unmeasuredDepth()). The very same
     /// where `captured`, these views before they were refined, has no such pixels; `pixels` tells

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <atomic>
 
 #include "lib/base/parallel.hpp"
 #include "lib/refine/refine_depth.hpp"
@@ -40,10 +41,13 @@ bool PageSet::mayRefine(const RefineSettings& settings) const {
     for (const PageView& view : views()) left = left.after(view.refined);
     if (!left.any()) return false;
     std::vector<RefineNeeds> ofViews(views().size(), RefineNeeds(left));
+    std::atomic<bool> enough = false;  // some view tells for all
     const auto look = [&](std::size_t i) {
+        if (enough) return;
         settle();
         ReferenceView copy;
         ofViews[i].add(viewImages(*this, i, copy));
+        if (ofViews[i].surely()) enough = true;
     };
     // Views in rectangles are copied; one at a time, since a copy takes the memory of a whole view.
     if (views().front().whole)
@@ -56,7 +60,8 @@ bool PageSet::mayRefine(const RefineSettings& settings) const {
     return needs.any();
 }
 
-PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) const {
+PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report,
+                         std::int64_t atOnce) const {
     RefineReport own;
     RefineReport& found = report ? *report : own;
     found = {};
@@ -72,7 +77,7 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) c
         const auto number = static_cast<std::size_t>(i);
         given[number] = viewImages(*this, number, copies[number]);
     });
-    auto better = refineDepth(given, left, found);
+    auto better = refineDepth(given, left, found, {spool(), atOnce});
     if (!found.changed()) return *this;
     auto data = std::make_shared<Data>(*data_);
     std::vector<std::shared_ptr<Image<float>>> depths(data->pages.size());

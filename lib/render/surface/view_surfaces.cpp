@@ -559,4 +559,15 @@ Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job) {
     return out;
 }
 
+std::uint64_t memoryOfSpooledSurfaces(const ViewTable& table) {
+    // Of one view, and of each pixel of all what is known of its block and whether it is a corner.
+    constexpr PeakMemory kOfOne = {peak::kSurfaces.what,
+                                   peak::kSurfaces.perPixel + peak::kSurfaces.perPixelOfLargest};
+    constexpr std::uint64_t kKnownOfEach = 3;
+    std::uint64_t pixels = 0;
+    for (std::size_t i = 0; i < table.count(); ++i) pixels += table.pixelsOf(i);
+    const std::uint64_t beside = memoryOfEach(table, kOfOne) + kKnownOfEach * pixels;
+    return beside + beside / (kSpoolPart - 1);
+}
+
 }  // namespace stx

@@ -9,6 +9,7 @@
 
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
+#include "lib/model/view_table.hpp"
 
 namespace stx {
 
@@ -46,5 +47,7 @@ struct ViewSurface {
 [[nodiscard]] Result<void> forEachSurface(
     const Bundle& bundle, PixelSpool* spool, Job& job,
     const std::function<Result<void>(std::size_t index, ViewSurface surface)>& take);
+/// Memory that it takes where the views are in a spool, with what that holds (kSpoolPart), bytes.
+[[nodiscard]] std::uint64_t memoryOfSpooledSurfaces(const ViewTable& table);
 
 }  // namespace stx

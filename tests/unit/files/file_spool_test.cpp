@@ -1,7 +1,10 @@
 // Pixels in a file: they are what they were, and pictures drawn from them are the same to the bit.
 #include <gtest/gtest.h>
 
+#include <sys/stat.h>
+
 #include <algorithm>
+#include <string>
 #include <thread>
 
 #include "formats/files/file_spool.hpp"
@@ -51,6 +54,42 @@ TEST(FileSpool, ServesManyThreads) {
         image.moveTo(spool.get());
         EXPECT_EQ(std::ranges::count(image.pixels(), value), (100 + value) * 64);
     });
+}
+
+/// Bytes of the open files in a folder that have no name any more.
+std::uint64_t bytesWithoutName(const std::filesystem::path& folder) {
+    std::uint64_t bytes = 0;
+    for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+        std::error_code error;
+        const std::string target = std::filesystem::read_symlink(entry.path(), error).string();
+        if (error || !target.starts_with(folder.string()) || !target.ends_with(" (deleted)"))
+            continue;
+        struct stat status {};
+        if (::stat(entry.path().c_str(), &status) == 0)
+            bytes += static_cast<std::uint64_t>(status.st_size);
+    }
+    return bytes;
+}
+
+TEST(FileSpool, TakesRoomThatWasGivenBack) {
+    const TemporaryFolder folder;
+    const auto spool = smallSpool(folder);
+    constexpr int kImages = 3;
+    const Image<float> image(1024, 64, 2.0f);
+    const std::uint64_t all = kImages * image.count() * sizeof(float);
+    for (int round = 0; round < 5; ++round) {
+        std::vector<Image<float>> kept(kImages, image);
+        for (auto& one : kept) one.moveTo(spool.get());
+        for (auto& one : kept) one.at(round, round) = static_cast<float>(round);
+        EXPECT_EQ(bytesWithoutName(folder.path()), all);
+        for (const auto& one : kept) {
+            EXPECT_EQ(one.at(round, round), static_cast<float>(round));
+            EXPECT_EQ(one.at(1000, 60), 2.0f);
+        }
+    }
+    Image<float> larger(2048, 64, 1.0f);
+    larger.moveTo(spool.get());
+    EXPECT_EQ(bytesWithoutName(folder.path()), all + larger.count() * sizeof(float));
 }
 
 TEST(FileSpool, LeavesNoFile) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 
+#include "lib/base/parallel.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
 #include "tests/noisy_depth.hpp"
@@ -103,6 +104,22 @@ TEST(RefineNeeded, OfNoise) {
     // Once is enough.
     for (ReferenceView& view : noisy.views) view.refined.steps = "noise";
     expectNeeds(noisy, {}, false, 0);
+}
+
+TEST(RefineNeeded, NoisyViewsAreNotReadToTheEnd) {
+    Bundle noisy = torusViews(96);
+    noisy::addNoise(noisy, 0.01);
+    ASSERT_GT(noisy.views.size(), 4u);
+    Bundle headers;
+    for (const ReferenceView& view : noisy.views)
+        static_cast<ViewHeader&>(headers.views.emplace_back()) = view;
+    const CopiedViews table(noisy, headers);
+    const ThreadLimit threads(2);
+    Job job;
+    const auto may = mayRefine(table, {}, job);
+    ASSERT_TRUE(may);
+    EXPECT_TRUE(*may);
+    EXPECT_LE(table.asked, 2) << "the first tell";
 }
 
 TEST(RefineNeeded, OfNoiseThatNoSmallViewHasEnoughOf) {

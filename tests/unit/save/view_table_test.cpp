@@ -12,6 +12,7 @@
 
 #include "formats/any/open.hpp"
 #include "formats/any/save.hpp"
+#include "formats/files/file_spool.hpp"
 #include "formats/imagesets/export.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/model/same_pictures.hpp"
@@ -226,6 +227,72 @@ TEST(ViewTable, HoldsAsManyViewsAsThereAreThreadsAndRoom) {
     EXPECT_EQ(mostOf(2 * view, 8), 1);
     // Before the first is read.
     EXPECT_EQ(mostOf(view, 8), 0);
+}
+
+TEST(ViewTable, IsReadUntilThatIsEnough) {
+    Bundle bundle;
+    for (int i = 0; i < 12; ++i) bundle.views.push_back(mpeg4::makeView(40, 24, 16, i));
+    const ThreadLimit threads(3);
+    const MadeViews table(bundle, headersOf(bundle));
+    Job job;
+    std::atomic<int> looked = 0;
+    ASSERT_TRUE(forEachView(
+        table, {"looking", 0}, job,
+        [&](std::size_t, std::shared_ptr<const ReferenceView>) -> Result<void> {
+            ++looked;
+            return {};
+        },
+        {}, [&] { return looked >= 4; }));
+    EXPECT_EQ(looked, 6) << "a round is not broken off";
+}
+
+TEST(ViewTable, OfASpoolIsWrittenAsItsBundleIs) {
+    const TemporaryFolder folder;
+    const Bundle bundle = threeViews(true);
+    Job job;
+    ASSERT_TRUE(saveBundle(bundle, folder / "a.exr", {}, job));
+    std::unique_ptr<ViewTable> table;
+    {
+        const auto read = openViews(folder / "a.exr", {}, job);
+        ASSERT_TRUE(read);
+        auto spool = FileSpool::create(folder.path(), 0);
+        ASSERT_TRUE(spool);
+        auto inSpool = wholeBundle(**read, **spool, job);
+        ASSERT_TRUE(inSpool) << inSpool.error().text();
+        table = tableOf(*std::move(inSpool), *std::move(spool), 1000);
+    }
+    EXPECT_FALSE(table->whole());
+    EXPECT_EQ(table->bytesHeld(), 1000u);
+    EXPECT_EQ(std::as_const(*table).about().title, "three");
+    ASSERT_TRUE(saveViews(*table, folder / "b.exr", {}, job));
+    EXPECT_EQ(bytesOf(folder / "b.exr"), bytesOf(folder / "a.exr"));
+    // What is in memory is a copy, which outlives the spool.
+    const auto expected = openBundle(folder / "a.exr", {}, job);
+    ASSERT_TRUE(expected);
+    const auto whole = wholeBundle(std::move(table), job);
+    ASSERT_TRUE(whole) << whole.error().text();
+    for (std::size_t i = 0; i < bundle.views.size(); ++i)
+        EXPECT_TRUE(samePictures(whole->views[i], expected->views[i])) << i;
+}
+
+TEST(ViewTable, MemoryFromASpoolIsThatOfAsManyAsThereIsRoomFor) {
+    Bundle bundle;
+    for (int i = 0; i < 12; ++i) bundle.views.push_back(mpeg4::makeView(40, 24, 16, i));
+    const ThreadLimit threads(3);
+    const MadeViews table(bundle, headersOf(bundle));
+    constexpr std::uint64_t kPixels = 40 * 24;
+    const PeakMemory work{"looking", 24};
+    Limits limits;
+    for (const std::uint64_t views : {1u, 2u, 3u, 9u}) {
+        // A little more than so many views and the spool.
+        limits.maxMemoryBytes = 34 * (views * 32 * kPixels) / 32;
+        EXPECT_EQ(
+            memoryFromSpool(table, work, limits),
+            limits.maxMemoryBytes / kSpoolPart + std::min<std::uint64_t>(views, 3) * 32 * kPixels)
+            << views;
+    }
+    limits.maxMemoryBytes = 32 * kPixels;
+    EXPECT_GT(memoryFromSpool(table, work, limits), limits.maxMemoryBytes) << "one is too large";
 }
 
 TEST(ViewTable, IsBakedAndExportedAsItsBundleIs) {

@@ -1,5 +1,7 @@
+#include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <numbers>
 #include <vector>
 
@@ -11,6 +13,8 @@
 #include "lib/splats/from_bundle.hpp"
 #include "lib/splats/merge.hpp"
 #include "lib/splats/transform.hpp"
+#include "lib/surface/normals.hpp"
+#include "tests/torus_bundle.hpp"
 #include "tests/unit/splats/random_cloud.hpp"
 
 namespace stx {
@@ -68,6 +72,45 @@ TEST(SplatsOfBundle, EachPlaceIsOfTheViewThatShowsItFinest) {
     ASSERT_TRUE(cloud);
     EXPECT_LT(cloud->positions.size(), static_cast<std::size_t>(front + (all - front) / 4));
     EXPECT_GE(cloud->positions.size(), static_cast<std::size_t>(front));
+}
+
+/// Room for pixels, counted.
+class CountedRoom final : public PixelSpool {
+  public:
+    void* take(std::size_t bytes) override {
+        taken += bytes;
+        return std::malloc(bytes);
+    }
+    void give(void* room, std::size_t /*bytes*/) noexcept override { std::free(room); }
+    void settle() noexcept override {}
+    std::atomic<std::size_t> taken = 0;
+};
+
+TEST(SplatsOfBundle, AreTheSameOfViewsOneByOneAndFromASpool) {
+    Bundle bundle = torusViews(48);
+    bundle.views[3].background = bundle.views[7].background = true;
+    bundle.origin = {10, 20, 30};
+    for (const bool axes : {false, true}) {
+        Job job;
+        if (axes) {
+            ASSERT_TRUE(bake(bundle, {}, job));
+        }
+        for (const std::size_t most : {0u, 20000u}) {
+            const SplatSettings settings{.most = most};
+            const auto expected = splatsOfBundle(bundle, settings, job);
+            ASSERT_TRUE(expected) << expected.error().text();
+            const auto table = viewsOf(bundle);
+            const auto found = splatsOfViews(*table, settings, nullptr, job);
+            ASSERT_TRUE(found) << found.error().text();
+            EXPECT_EQ(*found, *expected);
+            if (most > 0) continue;
+            CountedRoom room;
+            const auto spooled = splatsOfViews(*table, settings, &room, job);
+            ASSERT_TRUE(spooled) << spooled.error().text();
+            EXPECT_EQ(*spooled, *expected);
+            EXPECT_GE(room.taken, 52 * bundle.views.size() * bundle.views[0].depth.count());
+        }
+    }
 }
 
 TEST(SplatsOfBundle, ShowTheViewsAgain) {
