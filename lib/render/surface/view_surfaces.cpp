@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <iterator>
 #include <limits>
 #include <memory>
 #include <span>
@@ -98,9 +97,12 @@ OnePlace onePlaceOf(const SurfaceScene& scene) {
                       a.fy == b.fy && a.orthographic == b.orthographic &&
                       glm::length(border - glm::dvec2(place.border)) < 1e-3;
     if (!same) return {};
+    // A million pixels tell the median as well as all of a large photograph.
+    const auto all = place.front->whole->q.pixels();
+    const std::size_t step = std::max<std::size_t>(1, all.size() >> 20);
     std::vector<float> q;
-    std::ranges::copy_if(place.front->whole->q.pixels(), std::back_inserter(q),
-                         [](float value) { return value > 0; });
+    for (std::size_t i = 0; i < all.size(); i += step)
+        if (all[i] > 0) q.push_back(all[i]);
     if (q.empty()) return {};
     const auto middle = q.begin() + static_cast<std::ptrdiff_t>(q.size() / 2);
     std::ranges::nth_element(q, middle);
