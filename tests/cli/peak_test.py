@@ -238,7 +238,7 @@ def from_few(args, folder):
 
 
 # Of noisy views of 320²: how many, a limit under which they are refined in a spool, MiB, and one under which they are in memory.
-NOISY_VIEWS, NOISY_LIMIT, NOISY_IN_MEMORY = (16, 48), 1280, 16384
+NOISY_VIEWS, NOISY_LIMIT, NOISY_IN_MEMORY = (8, 24), 640, 16384
 # What is refined or refines first, and then looks at one view at a time.
 NOISY = {"refine exr": "refine {} -o OUT.exr", "refine mp4": "refine {} -o OUT.mp4 --without colours", "convert": "convert {} -o OUT.exr --refine noise",
          "folder": "extract {} -o OUT --refine noise", "points": "extract {} -o OUT.ply --refine noise,agree"}
@@ -285,8 +285,8 @@ def noisy_of_many(args, folder):
             wrong.append(f"noisy {name}: {many:.1f} MiB of {most_views} views, {few:.1f} of {few_views}")
         if made != expected:
             wrong.append(f"noisy {name}: it is not that of a larger --max-memory")
-    for name, words, limit in (("glb", "extract noisy48.exr -o OUT.glb", MODEL_LIMIT),
-                               ("picture", "render noisy48.exr -o OUT.png --eye 5,0,0 --target 5.2,0,-3 --size 256x256 --backend cpu", FEW_LIMIT)):
+    for name, words, limit in (("glb", "extract noisy24.exr -o OUT.glb", MODEL_LIMIT),
+                               ("picture", "render noisy24.exr -o OUT.png --eye 5,0,0 --target 5.2,0,-3 --size 256x256 --backend cpu", FEW_LIMIT)):
         output = [word for word in words.split() if word.startswith("OUT")][0]
         made = []
         for most in (limit, NOISY_IN_MEMORY):
