@@ -75,7 +75,7 @@ class Refining {
     Result<void> refine(Bundle& bundle, Job& job) { return refine(bundle, nullptr, job); }
     /// The same; in a spool if it is not null.
     Result<void> refine(Bundle& bundle, PixelSpool* spool, Job& job);
-    /// Errors (usage): a step that only an import can do, of what is no image set.
+    /// Errors (usage): a step that only an import can do, where the input is not an image set.
     [[nodiscard]] Result<void> check() const;
     /// What is left to do of what was read last.
     [[nodiscard]] RefineSettings left() const {

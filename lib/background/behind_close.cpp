@@ -13,9 +13,9 @@ namespace {
 constexpr float kNothingThere = std::numeric_limits<float>::infinity();
 /// Of what is nearly infinitely far away, pixels.
 constexpr float kLeastParallax = 1e-3f;
-/// Pixels by which it goes on under what is before it: triangles end in the middles of pixels, an
-/// eye that goes to the side turns, and slopes hide what is behind them. With 3, 0.002 % of cards
-/// before a wall are open from 8 % aside; with 8, nothing.
+/// Pixels by which what is hidden goes on under what is before it: triangles end in the middles of
+/// pixels, an eye that goes to the side turns, and slopes hide what is behind them. With 3, 0.002 %
+/// of cards before a wall are open from 8 % aside; with 8, nothing.
 constexpr int kGrownPixels = 8;
 /// Passes that carry values around corners of a region; more change nothing that is seen.
 constexpr int kCornerPasses = 3;
@@ -191,8 +191,6 @@ Image<float> seenBelow(const Layer& layer) {
     return seen;
 }
 
-constexpr std::array<glm::ivec2, 4> kBesideBlock = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
-
 }  // namespace
 
 Image<float> closeSteps(Layer& layer) {
@@ -207,6 +205,7 @@ Image<float> closeSteps(Layer& layer) {
 }
 
 void growUnder(Layer& layer, Sources& sources) {
+    constexpr std::array<glm::ivec2, 4> kBesideBlock = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
     const int always = (kGrownPixels + layer.step - 1) / layer.step;
     const Image<float> seen = seenBelow(layer);
     std::vector<glm::ivec2> rim, next;

@@ -17,7 +17,7 @@ struct LightRatio {
 
 enum class Half { both, upper, lower };
 
-/// What is off where there is no ratio: more than any.
+/// How far a fit is off that has no ratios to be measured by: farther than any that has.
 constexpr double kNoRatios = 1e9;
 
 struct VignettingFit {
@@ -31,8 +31,8 @@ constexpr double kNearCorner2 = 0.9 * 0.9;
 
 /// Cauchy's scale is so many times the median of what is left, and at least this; logarithms.
 constexpr double kScaleOfMedian = 2, kLeastScale = 1e-3;
-/// Weights of the assumption that there is no vignetting, for each ratio, and so that the equations
-/// can be solved where there is none.
+/// Weights of the assumption that corners lose no light: for each ratio, and so little more that
+/// the equations can be solved without any ratio.
 constexpr double kNoneIsLikely = 1e-4, kSolvable = 1e-9;
 /// A law may make light so much brighter somewhere (logarithm), and is looked at in so many places
 /// between the middle and the corner.

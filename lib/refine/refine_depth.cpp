@@ -283,7 +283,8 @@ class SideBySide {
     }
 
   private:
-    /// Some at a time, if there is no room for any number of them.
+    /// Calls for each view: for all at once in memory, for as many at a time as a spool has room
+    /// for.
     template <class Call>
     void ofEach(const Call& call) {
         const auto count = static_cast<std::int64_t>(views_.size());

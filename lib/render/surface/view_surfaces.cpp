@@ -273,9 +273,9 @@ class Maker {
             for (int i = 0; i < kBlock; ++i) {
                 const int x = corner.x + i, y = corner.y + j;
                 if ((inLeaf[static_cast<std::size_t>(j)] >> i & 1) || !openAt(s, x, y)) continue;
-                const bool falling = std::abs(q[index(s, x, y)] - q[index(s, x + 1, y + 1)]) <
-                                     std::abs(q[index(s, x + 1, y)] - q[index(s, x, y + 1)]);
-                addCell(falling ? kFallingSplit : kRisingSplit, x, y, add);
+                addCell(splitOf(q[index(s, x, y)], q[index(s, x + 1, y)], q[index(s, x, y + 1)],
+                                q[index(s, x + 1, y + 1)]),
+                        x, y, add);
             }
         }
     }

@@ -39,6 +39,11 @@ struct ViewSurface {
 /// sees in full. A view with an edge there does not count as showing it, one with a crease there
 /// must be much denser, so that no gap opens. Background views come last in that choice.
 ///
+/// One view and a background view from the same place (a photograph and what is behind it): an edge
+/// with nothing behind it would be a hole from the side. The background view is whole and joined
+/// across all of its edges; the other one where the background shows nothing there, or an eye aside
+/// by 8 % of the median distance sees a gap of less than 1.5 pixels.
+///
 /// Errors: a bundle that fails check(), memory over the limit, cancelled.
 [[nodiscard]] Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job);
 /// The same, each given to `take` in the order of the views while those of later ones are not made

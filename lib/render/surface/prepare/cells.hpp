@@ -9,6 +9,11 @@
 
 namespace stx::surface {
 
+/// The diagonal of a cell along which depth changes less.
+[[nodiscard]] inline std::uint32_t splitOf(float q00, float q10, float q01, float q11) {
+    return std::abs(q00 - q11) < std::abs(q10 - q01) ? kFallingSplit : kRisingSplit;
+}
+
 /// How the cell between a pixel (i, j) of a block and its right and lower neighbours is drawn when
 /// it is in no leaf: kNoCell, or kQuadCell and the shapes after it.
 [[nodiscard]] inline std::uint32_t cellShape(const Source& s, const BlockTexels& t, int i, int j) {
@@ -22,7 +27,7 @@ namespace stx::surface {
         if (links == 4 &&
             std::abs(q00 + q11 - q10 - q01) <= 2 * s.flat * s.space.axis.relativeScale(q00))
             return kQuadCell;
-        return std::abs(q00 - q11) < std::abs(q10 - q01) ? kFallingSplit : kRisingSplit;
+        return splitOf(q00, q10, q01, q11);
     }
     if (top && left) return kUpperLeft;
     if (top && right) return kUpperRight;
