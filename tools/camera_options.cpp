@@ -149,6 +149,14 @@ void addCameraOptions(Command command, CameraOptions& o) {
         .takes("FILE")
         .group(group);
     command
+        .choice<bool>(
+            "--camera-poses", o.aligned, {{"given", false}, {"aligned", true}},
+            "What the cameras of the file lie beside: given (the views as their image set had "
+            "them; "
+            "where refining moved the cameras of these, those of the file move as the ones near "
+            "them did) or aligned (the views as they are now; default given)")
+        .group(group);
+    command
         .option("--dataparser", o.dataparser,
                 "dataparser_transforms.json of the training that a camera_path.json belongs to "
                 "(default: one beside it): its cameras then are in the world of the images")
@@ -252,6 +260,7 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
         std::vector<NovelCamera> out;
         for (auto& c : cameras) {
             c.camera.position -= context.origin;
+            if (!o.aligned && !c.aligned) c.camera = alignedAmong(c.camera, context.moved);
             out.push_back({inPicture(c.camera, size), c.time});
         }
         return out;
@@ -299,8 +308,10 @@ Result<int> checkCameraOptions(const CameraOptions& options, const Command& comm
                                                            : "--cameras")));
     if (own || isPose(o)) STX_CHECK(command.refuse({"--elevation"}, "is of --orbit"));
     if (o.orbit == 0) STX_CHECK(command.refuse({"--radius", "--start", "--arc"}, "is of --orbit"));
-    if (o.cameraFile.empty())
+    if (o.cameraFile.empty()) {
         STX_CHECK(command.refuse({"--dataparser"}, "is of --cameras camera_path.json"));
+        STX_CHECK(command.refuse({"--camera-poses"}, "is of --cameras"));
+    }
     if (!sways) STX_CHECK(command.refuse({"--frames"}, "is of --sway"));
     o.view = -1;  // needs the input
     CameraContext unitCube;

@@ -8,6 +8,7 @@
 #include "lib/geometry/bounds.hpp"
 #include "lib/geometry/camera.hpp"
 #include "lib/model/reference_view.hpp"
+#include "lib/registration/camera_moves.hpp"
 #include "tools/command_line.hpp"
 #include "tools/program.hpp"
 
@@ -26,6 +27,7 @@ struct CameraOptions {
     int swayFrames = 0;      ///< 0 = not given
     std::string cameraFile;
     std::string dataparser;  ///< of a camera_path.json; empty: one beside it
+    bool aligned = false;    ///< its cameras are where refining moved those of the views
     std::string size;
 };
 
@@ -54,6 +56,8 @@ struct CameraContext {
     Bounds bounds;              ///< of the object
     glm::dvec3 origin{0.0};     ///< what bounds and views count from; options are in the world
     std::vector<Camera> views;  ///< of the reference views; empty for a mesh
+    std::vector<MovedCamera> moved =
+        {};                             ///< the same, with how refining moved them; empty: of none
     std::optional<glm::dvec3> up = {};  ///< of a cloud of splats: SplatCloud::up
     std::optional<SwayPose> sway = {};  ///< where --sway is given
 };

@@ -38,7 +38,7 @@ Result<std::vector<NamedCamera>> camerasOf(const std::vector<imagesets::SetView>
         }
         if (auto ok = camera.check(); !ok)
             return tl::unexpected(ok.error().at(fmt::format("camera '{}'", view.name)).at(where));
-        out.push_back({view.name, camera, view.time});
+        out.push_back({view.name, camera, view.time, view.refined.moved.has_value()});
     }
     if (sizeMissing && !size)
         job.note(fmt::format("{} does not tell the images' size; 512x512 is used", where));

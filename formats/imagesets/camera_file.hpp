@@ -14,6 +14,7 @@ struct NamedCamera {
     std::string name;
     Camera camera;
     std::optional<double> time = {};  ///< seconds, where the file says it
+    bool aligned = false;             ///< an export of ours says that refining moved it already
 };
 
 /// The cameras of a file, in its order, without any image: transforms.json (NeRF, nerfstudio,

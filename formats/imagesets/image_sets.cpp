@@ -194,13 +194,20 @@ Result<SetDescription> describeFirst(const std::filesystem::path& path,
     return set;
 }
 
+/// Options for a moment of what moves: cameras of each by itself would tremble.
+ImageSetOptions ofMoment(ImageSetOptions options) {
+    if (options.refine.of(RefineStep::poses) == RefineSwitch::automatic)
+        options.refine.set(RefineStep::poses, false);
+    return options;
+}
+
 /// A set whose moments are in its description, or one that is described again for each frame.
 class SetSequence : public Sequence {
   public:
     SetSequence(std::filesystem::path path, ImageSetOptions options, SetDescription set,
                 Motion motion)
         : path_(std::move(path)),
-          options_(std::move(options)),
+          options_(ofMoment(std::move(options))),
           set_(std::move(set)),
           motion_(std::move(motion)) {
         if (motion_.moves()) {
@@ -325,7 +332,7 @@ Result<Bundle> momentAsked(Described& described, const std::string& where,
         job.note(fmt::format("the set moves: {} frames over {:.4g} s; this is the first",
                              motion.times.size(), motion.timeline().duration()));
     const auto frame = static_cast<std::size_t>(options.frame);
-    STX_TRY(auto bundle, momentOf(described.set, motion, frame, where, options, job));
+    STX_TRY(auto bundle, momentOf(described.set, motion, frame, where, ofMoment(options), job));
     bundle.time = motion.times[frame];
     return bundle;
 }

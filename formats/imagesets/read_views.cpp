@@ -11,20 +11,27 @@
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/origin.hpp"
 #include "lib/model/srgb8.hpp"
-#include "lib/refine/poses.hpp"
+#include "lib/registration/camera_moves.hpp"
 #include "lib/registration/disagreement.hpp"
 
 namespace stx::imagesets {
 namespace {
 
-/// Refines the poses where that is asked for, and says which views disagree.
-Result<void> attendToPoses(Bundle& bundle, const ImageSetOptions& options, RefineReport& report,
-                           Job& job) {
-    const bool refines = options.refine.atImport(RefineStep::poses, false);
-    if (refines) {
-        STX_TRY(report.of(RefineStep::poses), alignPoses(bundle, nullptr, job));
+/// Aligns the poses where that is due, and says which views disagree.
+Result<void> attendToPoses(Bundle& bundle, const ImageSetOptions& options,
+                           const std::vector<Bounds>& each, glm::dvec3 subtracted,
+                           RefineReport& report, Job& job) {
+    const auto when = alignsPoses(bundle, options);
+    if (when) {
+        std::vector<PoseSample> samples(bundle.views.size());
+        parallelFor(0, static_cast<std::int64_t>(samples.size()), [&](std::int64_t i) {
+            const auto at = static_cast<std::size_t>(i);
+            samples[at] = poseSampleOf(bundle.views[at], samplePixels(samples.size()));
+        });
+        STX_CHECK(alignCameras(bundle, std::move(samples), *when, each, subtracted, report, job));
     }
-    if (const auto note = disagreementNote(bundle, measureDepthDisagreement(bundle), refines))
+    const bool aligned = when == AlignPoses::asked || posesWereAligned(bundle);
+    if (const auto note = disagreementNote(bundle, measureDepthDisagreement(bundle), aligned))
         job.note(*note);
     return {};
 }
@@ -140,6 +147,16 @@ Result<RefineReport> loadEach(
     return report;
 }
 
+Bounds togetherOf(const std::vector<Bounds>& each) {
+    Bounds all;
+    for (const Bounds& one : each) {
+        if (one.empty()) continue;
+        all.add(one.min);
+        all.add(one.max);
+    }
+    return all;
+}
+
 void makeNamesUnique(std::vector<ReferenceView>& views) {
     std::set<std::string> taken;
     for (ReferenceView& view : views) {
@@ -178,6 +195,41 @@ glm::dvec3 findOrigin(Bundle& bundle, const SetDescription& set, Job& job) {
     return origin;
 }
 
+bool depthWasMeasured(const ViewHeader& view) {
+    return view.noDepth == NoDepth::unknown && !view.pruned && !view.background;
+}
+
+std::optional<AlignPoses> alignsPoses(const Bundle& about, const ImageSetOptions& options) {
+    if (options.refine.of(RefineStep::poses) == RefineSwitch::on) return AlignPoses::asked;
+    const bool measured = about.views.size() > 1 && !posesWereAligned(about) &&
+                          std::ranges::all_of(about.views, depthWasMeasured);
+    if (!options.refine.atImport(RefineStep::poses, measured)) return {};
+    return AlignPoses::found;
+}
+
+Result<void> alignCameras(Bundle& about, std::vector<PoseSample> samples, AlignPoses when,
+                          const std::vector<Bounds>& each, glm::dvec3 subtracted,
+                          RefineReport& report, Job& job) {
+    STX_TRY(const AlignedPoses aligned, alignPoses(std::move(samples), when, job));
+    RefineReport ofPoses;
+    ofPoses.of(RefineStep::poses) = aligned.report;
+    report.add(ofPoses);
+    if (aligned.report.views == 0) return {};
+    about.bounds.emplace();
+    for (std::size_t i = 0; i < about.views.size(); ++i) {
+        ReferenceView& view = about.views[i];
+        const Camera before = view.camera;
+        if (aligned.moves[i]) moveCamera(view, *aligned.moves[i]);
+        ofPoses.record(view.refined);
+        if (each[i].empty()) continue;
+        const Bounds local{each[i].min - subtracted, each[i].max - subtracted};
+        const Bounds moved = movedBounds(local, before, view.camera);
+        about.bounds->add(moved.min);
+        about.bounds->add(moved.max);
+    }
+    return {};
+}
+
 Result<Bundle> readViews(SetDescription set, const std::string& where,
                          const ImageSetOptions& options, Job& job,
                          std::optional<std::size_t>* failing) {
@@ -210,9 +262,14 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
     if (!set.environment.empty()) {
         STX_TRY(bundle.environment, readEnvironmentExr(set.environment, job));
     }
-    bundle.bounds = bundle.computeBounds();
-    findOrigin(bundle, set, job);
-    STX_CHECK(attendToPoses(bundle, options, report, job));
+    std::vector<Bounds> each(bundle.views.size());
+    parallelFor(0, static_cast<std::int64_t>(each.size()), [&](std::int64_t i) {
+        const auto at = static_cast<std::size_t>(i);
+        each[at] = bundle.views[at].computeBounds();
+    });
+    bundle.bounds = togetherOf(each);
+    const glm::dvec3 subtracted = findOrigin(bundle, set, job);
+    STX_CHECK(attendToPoses(bundle, options, each, subtracted, report, job));
     if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));
     if (set.photo && options.photo.behindPercent > 0) {
         const BehindSettings settings{options.photo.behindPercent};

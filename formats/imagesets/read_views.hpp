@@ -11,6 +11,7 @@
 #include "formats/imagesets/image_sets.hpp"
 #include "formats/imagesets/set_view.hpp"
 #include "lib/model/view_table.hpp"
+#include "lib/refine/poses.hpp"
 
 /// From the description of a set to its views: all in memory, or as a table of views that are read
 /// when they are asked for.
@@ -51,6 +52,8 @@ namespace stx::imagesets {
     const SetDescription& set, const std::string& where, const ImageSetOptions& options,
     std::size_t atOnce, Job& job, std::optional<std::size_t>* failing,
     const std::function<Result<void>(std::size_t index, std::vector<ReferenceView> views)>& take);
+/// The box around those that are not empty.
+[[nodiscard]] Bounds togetherOf(const std::vector<Bounds>& each);
 /// Names become part and file names: each is there once.
 void makeNamesUnique(std::vector<ReferenceView>& views);
 /// Colours of 8 bits become floats, of which they come back.
@@ -58,5 +61,17 @@ void makeLinear(ReferenceView& view);
 /// Decides on the origin of a set whose bounds are known: Bundle::origin and bounds, the cameras.
 /// What was subtracted from these.
 glm::dvec3 findOrigin(Bundle& bundle, const SetDescription& set, Job& job);
+
+/// Whether the depth of a view was measured, as depth cameras do, which miss some of it.
+[[nodiscard]] bool depthWasMeasured(const ViewHeader& view);
+/// When cameras of a set are moved so that views agree: as the options say, else of two views and
+/// more whose depth was measured. None: not at all.
+[[nodiscard]] std::optional<AlignPoses> alignsPoses(const Bundle& about,
+                                                    const ImageSetOptions& options);
+/// Does it to the cameras of a bundle, of which headers do, by samples of its views. `each`:
+/// bounds of each view before `subtracted` was taken from all places.
+[[nodiscard]] Result<void> alignCameras(Bundle& about, std::vector<PoseSample> samples,
+                                        AlignPoses when, const std::vector<Bounds>& each,
+                                        glm::dvec3 subtracted, RefineReport& report, Job& job);
 
 }  // namespace stx::imagesets

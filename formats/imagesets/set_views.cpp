@@ -47,8 +47,8 @@ class FilesOfView {
 struct Looked {
     std::vector<ViewImageKinds> kinds;
     std::vector<FilesOfView> files;
-    bool linear = false;         ///< some picture holds linear light: all are to
-    glm::dvec3 subtracted{0.0};  ///< from the cameras' places; see findOrigin()
+    bool linear = false;      ///< some picture holds linear light: all are to
+    bool posesAsked = false;  ///< poses were to be aligned, or left
     std::unique_ptr<DisagreementByView> disagreement;
     ColourPoints points;  ///< of what is given; empty where that is not what was looked at
 };
@@ -84,11 +84,14 @@ class SetViews : public ViewTable, public ViewsLookedAt {
         STX_CHECK(within(where_, looked_.files[index].check()));
         if (!loaded) return tl::unexpected(loaded.error().at(where_));
         auto view = std::make_shared<ReferenceView>(std::move(loaded->front()));
-        view->name = about().views[index].name;
-        view->camera.position -= looked_.subtracted;
+        const ViewHeader& header = about().views[index];
+        view->name = header.name;
+        view->camera = header.camera;
+        view->refined = header.refined;
         if (looked_.linear) makeLinear(*view);
         if (looked_.disagreement->compare(index, view->depth, about()))
-            if (const auto note = disagreementNote(about(), looked_.disagreement->result(), false))
+            if (const auto note = disagreementNote(about(), looked_.disagreement->result(),
+                                                   looked_.posesAsked || posesWereAligned(about())))
                 job.noteAbove(*note);
         return view;
     }
@@ -103,8 +106,7 @@ class SetViews : public ViewTable, public ViewsLookedAt {
 /// Whether each view of a set can be made from its own files alone. One that repeats its camera's
 /// last picture, and the faces of panoramas, come from films and sets of few pictures.
 bool standAlone(const SetDescription& set, const ImageSetOptions& options) {
-    return !options.refine.atImport(RefineStep::poses, false) &&
-           !(set.photo && options.photo.behindPercent > 0) &&
+    return !(set.photo && options.photo.behindPercent > 0) &&
            std::ranges::none_of(set.views, [](const SetView& view) {
                return view.panorama || view.absent || view.texture.film || view.depth.film;
            });
@@ -159,6 +161,7 @@ Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::s
     looked.disagreement = std::make_unique<DisagreementByView>(count);
     for (const SetView& view : set.views) looked.files.emplace_back(view);
     std::vector<Bounds> bounds(count);
+    std::vector<PoseSample> samples(count);
     const auto look = [&](std::size_t i, std::vector<ReferenceView> views) -> Result<void> {
         const ReferenceView& view = views.front();
         if (auto ok = view.check(); !ok)
@@ -169,24 +172,29 @@ Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::s
         bounds[i] = view.computeBounds();
         looked.disagreement->sample(i, view.depth);
         looked.points[i] = colourPointsOf(view);
+        if (options.refine.atImport(RefineStep::poses, depthWasMeasured(view)))
+            samples[i] = poseSampleOf(view, samplePixels(count));
         return {};
     };
     STX_TRY(const std::size_t atOnce, within(where, viewsAtOnce(set, job.limits)));
-    STX_TRY(const RefineReport report, loadEach(set, where, options, atOnce, job, nullptr, look));
+    STX_TRY(RefineReport report, loadEach(set, where, options, atOnce, job, nullptr, look));
     makeNamesUnique(headers.views);
     looked.linear = std::ranges::any_of(looked.kinds, &ViewImageKinds::linear);
     for (ViewImageKinds& kinds : looked.kinds) kinds.linear = looked.linear;
     if (!set.environment.empty()) {
         STX_TRY(headers.environment, readEnvironmentExr(set.environment, job));
     }
-    headers.bounds.emplace();
-    for (const Bounds& one : bounds) {
-        if (one.empty()) continue;
-        headers.bounds->add(one.min);
-        headers.bounds->add(one.max);
+    headers.bounds = togetherOf(bounds);
+    const glm::dvec3 subtracted = findOrigin(headers, set, job);
+    if (const auto when = alignsPoses(headers, options)) {
+        looked.posesAsked = when == AlignPoses::asked;
+        for (std::size_t i = 0; i < count; ++i)
+            samples[i].header.camera.position = headers.views[i].camera.position;
+        STX_CHECK(
+            alignCameras(headers, std::move(samples), *when, bounds, subtracted, report, job));
     }
-    looked.subtracted = findOrigin(headers, set, job);
-    if (looked.linear || looked.subtracted != glm::dvec3(0.0)) looked.points.clear();
+    if (looked.linear || subtracted != glm::dvec3(0.0) || posesWereAligned(headers))
+        looked.points.clear();
     if (options.refined) options.refined(report);
     return std::make_unique<SetViews>(std::move(headers), std::move(set), where, options,
                                       std::move(looked));

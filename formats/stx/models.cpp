@@ -6,6 +6,7 @@
 #include "formats/stx/mesh_views.hpp"
 #include "lib/geometry/view_layout.hpp"
 #include "lib/model/splat_cloud.hpp"
+#include "lib/registration/camera_moves.hpp"
 
 namespace stx {
 namespace {
@@ -102,6 +103,17 @@ glm::dvec3 upOf(const Model& model) {
     for (const auto& view : atlas ? atlas->views : std::get<Bundle>(model).views)
         cameras.push_back(view.camera);
     return upOfCameras(cameras);
+}
+
+Camera alignedCamera(const Model& model, const Camera& camera) {
+    std::vector<MovedCamera> views;
+    const auto add = [&](const auto& seen) {
+        for (const auto& view : seen.views)
+            if (!view.background) views.push_back(MovedCamera::of(view));
+    };
+    if (const auto* bundle = std::get_if<Bundle>(&model)) add(*bundle);
+    if (const auto* atlas = std::get_if<Atlas>(&model)) add(*atlas);
+    return alignedAmong(camera, views);
 }
 
 Bounds boundsOf(const Model& model) {

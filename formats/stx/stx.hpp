@@ -147,6 +147,11 @@ struct ConvertSettings {
 /// plus this are the world's. 0 but for models whose coordinates are too large for floats.
 [[nodiscard]] glm::dvec3 originOf(const Model& model);
 
+/// A camera that was given beside those of a model's views, where the step `poses` of refining
+/// would have moved it: as the ones near it (lib/registration/camera_moves.hpp). Both in the
+/// model's coordinates. It stays, to the bit, where no view was moved.
+[[nodiscard]] Camera alignedCamera(const Model& model, const Camera& camera);
+
 /// The up axis of a model, unit: the axis of its reference views, of a cloud of splats what is up
 /// by the habits of its format, else +Y.
 [[nodiscard]] glm::dvec3 upOf(const Model& model);

@@ -41,15 +41,26 @@ enum class NoDepth : std::uint8_t {
     return std::nullopt;
 }
 
-/// What refining has done to the depth of a view (lib/refine/refine.hpp).
+/// How a camera was moved from where it was given.
+struct CameraMove {
+    glm::dvec3 shift{0.0};  ///< was added to its position, scene units
+    glm::dquat turn{1.0, 0.0, 0.0,
+                    0.0};  ///< unit; its orientation was multiplied by it from the left
+
+    bool operator==(const CameraMove&) const = default;
+};
+
+/// What refining has done to a view (lib/refine/refine.hpp).
 struct Refined {
     /// Those that changed something in its set: names with commas between them; empty: none.
     std::string steps;
     /// How far off points may be: share of the distance (of orthographic views: of the depth range
     /// of their DepthAxis), one standard deviation; 0 of depth that was exact.
     float doubt = 0;
+    std::optional<CameraMove> moved = {};  ///< by the step poses
 
-    /// As containers keep it: "noise,agree 0.0031".
+    /// As containers keep it: "noise,agree 0.0031"; of a camera that was moved with the shift and
+    /// w, x, y, z of the turn behind it.
     [[nodiscard]] std::string text() const;
     /// Of such a text; none of others.
     [[nodiscard]] static std::optional<Refined> from(std::string_view text);

@@ -36,7 +36,7 @@ constexpr std::array<RefineStepInfo, kRefineSteps> kSteps{{
      "pixels without depth get that of the surface whose colours lead there", ""},
     {align, "align", kBoth, known, "older Middlebury sets",
      "edges of depth move to where the picture has them", ""},
-    {poses, "poses", kBoth, never, "never",
+    {poses, "poses", kBoth, known, "sets with missing depth, where colours tell",
      "cameras move so that overlapping views agree in depth and colour", "Newcombe et al. 2011"},
     {exposure, "exposure", kRefine, found, kFound,
      "colours of cameras that expose for themselves are matched", ""},
@@ -234,7 +234,7 @@ Result<RefineReport> refineIn(const RefineRoom& room, Bundle& bundle,
     RefineSettings once = settings;
     for (const ReferenceView& view : bundle.views) once = once.after(view.refined);
     if (once.on(poses)) {
-        STX_TRY(ofAll.of(poses), alignPoses(bundle, room.spool, job));
+        STX_TRY(ofAll.of(poses), alignPoses(bundle, AlignPoses::asked, job));
     }
     report.add(ofAll);
     // What is behind everything is of other times: it says nothing of what is in front.

@@ -47,7 +47,6 @@ enum class RefineAuto {
     found,   ///< it measures whether there is something to do: exact views stay, to the bit
     known,   ///< it is done of sets that are known to need it
     splats,  ///< of what is drawn as splats
-    never,
 };
 
 struct RefineStepInfo {

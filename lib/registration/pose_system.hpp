@@ -6,6 +6,7 @@
 #include <glm/glm.hpp>
 
 #include "lib/registration/overlap.hpp"
+#include "lib/registration/pose_sample.hpp"
 
 namespace stx::registration {
 
@@ -24,7 +25,7 @@ struct PairEquations {
 /// The equations of all poses together.
 class PoseSystem {
   public:
-    PoseSystem(const Bundle& bundle, const std::vector<Pair>& pairs);
+    PoseSystem(const std::vector<PoseSample>& views, const std::vector<Pair>& pairs);
 
     /// How a difference changes with the twist of the view that its point belongs to; `gradient`:
     /// how it changes when the point moves in the world.
@@ -33,7 +34,7 @@ class PoseSystem {
     /// Solves for the twists of all views and moves their cameras. Connected views keep
     /// their mean pose. Gives the largest component of a twist.
     double solveAndMove(const std::vector<Pair>& pairs, const std::vector<PairEquations>& equations,
-                        Bundle& bundle);
+                        std::vector<PoseSample>& views);
 
   private:
     glm::dvec3 centre_{0.0};

@@ -43,6 +43,7 @@ Outcome unknownDepth(Pictures& pictures);
 
 // recorded.cpp: views as a depth camera records them.
 Outcome recordedBelowWarp(Pictures& pictures);
+Outcome aligningIsWorse(Pictures& pictures);
 Outcome refiningIsWorse(Pictures& pictures);
 
 // chosen_views.cpp: some of the views, the pixels of the others not there.

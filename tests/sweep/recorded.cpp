@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include "lib/refine/poses.hpp"
+#include "lib/registration/camera_moves.hpp"
 #include "tests/naive_warp.hpp"
 #include "tests/sweep/measures.hpp"
 #include "tests/sweep/sensor.hpp"
@@ -91,6 +93,23 @@ Outcome refiningIsWorse(Pictures& pictures) {
     const double a = pictures.psnr(refined), b = pictures.psnr(before);
     return Measure{worseBy(a, b),
                    fmt::format("{}: refined {:.2f} dB, as it is {:.2f} dB", recorded.what, a, b)};
+}
+
+Outcome aligningIsWorse(Pictures& pictures) {
+    if (pictures.seenCount(1) < kFewest) return std::nullopt;
+    const Recorded recorded(pictures);
+    Bundle aligned = recorded.bundle;
+    Job job;
+    STX_TRY(const RefineStepReport done, alignPoses(aligned, AlignPoses::found, job));
+    if (done.views == 0) return std::nullopt;
+    std::vector<MovedCamera> views;
+    for (const ReferenceView& view : aligned.views) views.push_back(MovedCamera::of(view));
+    const Camera& novel = pictures.captured().novel;
+    STX_TRY(const Frame after, drawBundle(aligned, alignedAmong(novel, views), recorded.how));
+    STX_TRY(const Frame before, drawBundle(recorded.bundle, novel, recorded.how));
+    const double a = pictures.psnr(after), b = pictures.psnr(before);
+    return Measure{worseBy(a, b),
+                   fmt::format("{}: aligned {:.2f} dB, as it is {:.2f} dB", recorded.what, a, b)};
 }
 
 }  // namespace measures

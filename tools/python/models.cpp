@@ -281,7 +281,14 @@ void bindModels(py::module_& module) {
             "coordinates.")
         .def_property_readonly(
             "up", [](const AnyModel& m) { return arrayOf(upOf(*m.model)); },
-            "(3,) float64, unit: what it stands on.");
+            "(3,) float64, unit: what it stands on.")
+        .def(
+            "aligned",
+            [](const AnyModel& m, const Camera& camera) { return alignedCamera(*m.model, camera); },
+            py::arg("camera"),
+            "A camera that was given beside those of the views, moved as the ones near it were "
+            "where "
+            "`poses` of refining moved them; else the same.");
     bindMesh(module);
     bindBundle(module);
     bindAtlas(module);

@@ -92,6 +92,7 @@ int main(int argc, char** argv) {
     for (const auto& c : orbit)
         require(valueOf(renderer->render(c)).colour == valueOf(sharing->render(c)).colour,
                 "a shared model gives another picture");
+    require(stx::alignedCamera(opened, orbit[0]) == orbit[0], "a camera moved beside exact views");
     require(stx::upOf(opened) == glm::dvec3(0, 1, 0), "the atlas does not stand on +Y");
 
     // Three frames, of which each has the camera a little farther on.

@@ -83,7 +83,7 @@ TEST(SpheresMiv, TheCenterViewIsRenderedAsWellAsTheDesignPromises) {
     RenderSettings settings;
     auto renderer = makeRenderer(Backend::cpu, *bundle, settings, -1, job);
     ASSERT_TRUE(renderer) << renderer.error().text();
-    for (const auto& [name, camera, time] : *cameras) {
+    for (const auto& [name, camera, time, aligned] : *cameras) {
         if (name != "gt_center") continue;
         const auto frame = (*renderer)->render(camera);
         ASSERT_TRUE(frame);
@@ -110,7 +110,7 @@ double wholeFrame(const Bundle& bundle, const std::filesystem::path& set, const 
     const auto renderer = makeRenderer(Backend::cpu, bundle, {}, -1, job);
     if (!cameras || !bytes || !renderer) return 0;
     const auto truth = decodeImage(*bytes, name, job.limits);
-    for (const auto& [label, camera, time] : *cameras) {
+    for (const auto& [label, camera, time, aligned] : *cameras) {
         if (label != name) continue;
         const auto frame = (*renderer)->render(camera);
         if (!truth || !frame) return 0;

@@ -97,19 +97,21 @@ void expectSameOnDemand(const std::filesystem::path& set, const ImageSetOptions&
 }
 
 /// Views of the room, as a transforms.json with depth in millimetres, `first` before the frames;
-/// the third disagrees with the others.
-void writeRoom(const TemporaryFolder& folder, const std::string& first, glm::dvec3 away = {}) {
+/// the third disagrees with the others, or all do, as their poses `drift`.
+void writeRoom(const TemporaryFolder& folder, const std::string& first, glm::dvec3 away = {},
+               double drift = 0) {
     const auto views = roomViews(4);
     std::string frames;
     for (std::size_t i = 0; i < views.size(); ++i) {
         const ReferenceView& v = views[i];
-        const float scale = i == 2 ? 1030.0f : 1000.0f;
+        const float scale = i == 2 && drift == 0 ? 1030.0f : 1000.0f;
         writeColour(folder / fmt::format("c{}.png", i), v);
         writeCodes(folder / fmt::format("d{}.png", i), v.camera.width, v.camera.height, 16,
                    [&](int x, int y) {
                        return hasPoint(v.depth.at(x, y)) ? scale * v.depth.at(x, y) + 0.5f : 0.0f;
                    });
         glm::dmat4 pose = v.camera.worldFromCamera();
+        pose = pose * glm::rotate(glm::dmat4(1.0), i % 2 ? drift : -drift, {0.2, 1.0, 0.3});
         pose[3] += glm::dvec4(away, 0.0);
         frames += fmt::format(
             "{}{{\"file_path\":\"c{}.png\",\"depth_file_path\":\"d{}.png\",\"fl_x\":{},\"fl_y\":{},"
@@ -139,6 +141,32 @@ TEST(SetViewsOnDemand, AreThoseOfASetThatIsFarAway) {
     const TemporaryFolder folder;
     writeRoom(folder, "", {4e6, -2e6, 1e5});
     expectSameOnDemand(folder.path(), {}, "is subtracted", false);
+}
+
+TEST(SetViewsOnDemand, AreThoseWhosePosesAreAligned) {
+    for (const glm::dvec3 away : {glm::dvec3(0), glm::dvec3(4e6, -2e6, 1e5)}) {
+        const TemporaryFolder folder;
+        writeRoom(folder, "", away, glm::radians(0.5));
+        expectSameOnDemand(folder.path(), {}, "poses refined", false);
+        ImageSetOptions asked;
+        asked.refine.set(RefineStep::poses, true);
+        expectSameOnDemand(folder.path(), asked, "poses refined", false);
+        // Each knows how its camera moved.
+        Job job;
+        const auto aligned = readImageSet(folder.path(), {}, job);
+        ImageSetOptions without;
+        without.refine.set(RefineStep::poses, false);
+        const auto given = readImageSet(folder.path(), without, job);
+        ASSERT_TRUE(aligned && given);
+        for (std::size_t i = 0; i < given->views.size(); ++i) {
+            const Camera& now = aligned->views[i].camera;
+            const auto& move = aligned->views[i].refined.moved;
+            ASSERT_TRUE(move);
+            EXPECT_LT(glm::length(now.position - move->shift - given->views[i].camera.position),
+                      1e-9);
+            EXPECT_GT(glm::length(now.orientation - given->views[i].camera.orientation), 1e-3);
+        }
+    }
 }
 
 TEST(SetViewsOnDemand, AreAllLinearWhereOneIs) {

@@ -159,6 +159,13 @@ TEST(Refine, WhatViewsHaveHadIsAText) {
     EXPECT_EQ(refined.text(), "noise,agree 0.0031");
     EXPECT_EQ(Refined::from(refined.text()), refined);
     EXPECT_EQ(Refined::from("edges 0"), (Refined{"edges", 0}));
+    Refined moved{"poses", 0};
+    moved.moved = CameraMove{{0.1, -2e-7, 3}, glm::normalize(glm::dquat(1, 0.01, -0.002, 1.0 / 3))};
+    EXPECT_EQ(Refined::from(moved.text()), moved);
+    for (const char* wrong :
+         {"poses 0 1 2 3 1 0 0", "poses 0 1 2 3 1 0 0 0 0", "poses 0 1 2 3 2 0 0 0",
+          "poses 0 1 2 nan 1 0 0 0", "poses 0 1 2  3 1 0 0 0", "poses 0 1 2 3 1 0 0 0 "})
+        EXPECT_FALSE(Refined::from(wrong)) << wrong;
     for (const char* wrong : {"", "noise", "noise ", " 0.1", "noise -1", "noise 2", "noise nan",
                               "noise 0.1 more", "Noise 0.1", "a;b 0"})
         EXPECT_FALSE(Refined::from(wrong)) << wrong;

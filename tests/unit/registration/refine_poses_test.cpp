@@ -166,6 +166,81 @@ TEST(RefinePoses, TheSameOnAnyNumberOfThreads) {
         EXPECT_EQ(one.views[i].camera, three.views[i].camera);
 }
 
+PoseRefinementSettings ifColoursTell() {
+    PoseRefinementSettings settings;
+    settings.onlyIfColoursTell = true;
+    return settings;
+}
+
+/// Depth off by half a percent, each pixel by itself.
+void addNoise(Bundle& bundle) {
+    std::mt19937 random(11);
+    std::normal_distribution<float> normal(0, 0.005f);
+    for (ReferenceView& view : bundle.views)
+        for (float& depth : view.depth.pixels())
+            if (hasPoint(depth)) depth *= 1 + normal(random);
+}
+
+TEST(RefinePoses, ColoursTellThatPosesWereOff) {
+    for (const bool noisy : {false, true}) {
+        const Bundle truth = wall();
+        Bundle bundle = truth;
+        if (noisy) addNoise(bundle);
+        disturb(bundle, glm::radians(0.5), 0.01);
+        Job job;
+        const auto done = refinePoses(bundle, ifColoursTell(), job);
+        ASSERT_TRUE(done);
+        EXPECT_TRUE(done->kept) << noisy;
+        EXPECT_LT(done->coloursAfter, 0.8 * done->coloursBefore);
+        EXPECT_LT(relativeTo(truth, bundle).turn, glm::radians(noisy ? 0.1 : 0.02));
+    }
+}
+
+TEST(RefinePoses, ColoursTellThatPosesWereRight) {
+    for (const bool noisy : {false, true}) {
+        Bundle bundle = wall();
+        if (noisy) addNoise(bundle);
+        const Bundle given = bundle;
+        Job job;
+        const auto done = refinePoses(bundle, ifColoursTell(), job);
+        ASSERT_TRUE(done);
+        EXPECT_FALSE(done->kept) << noisy;
+        for (std::size_t i = 0; i < given.views.size(); ++i)
+            EXPECT_EQ(bundle.views[i].camera, given.views[i].camera);
+    }
+}
+
+TEST(RefinePoses, SamplesShowTheSamePoints) {
+    const ReferenceView view = wall().views[1];
+    const PoseSample sample = poseSampleOf(view, 200 * 160 / 16);
+    EXPECT_EQ(sample.header.camera.width, 50);
+    EXPECT_EQ(sample.depth.size(), glm::ivec2(50, 40));
+    EXPECT_EQ(sample.grey.front().size(), glm::ivec2(50, 40));
+    int points = 0;
+    for (int y = 0; y < 40; ++y) {
+        for (int x = 0; x < 50; ++x) {
+            const float dist = sample.depth.at(x, y);
+            if (!hasPoint(dist)) continue;
+            ++points;
+            const glm::dvec3 p =
+                view.camera.position +
+                view.camera.orientation * sample.header.camera.unproject(x + 0.5, y + 0.5, dist);
+            EXPECT_NEAR(p.z, height(p.x, p.y), 2e-4);
+        }
+    }
+    EXPECT_GT(points, 1500);
+    // The whole view, to the bit.
+    EXPECT_EQ(poseSampleOf(view).depth, view.depth);
+    EXPECT_EQ(poseSampleOf(view).header.camera, view.camera);
+}
+
+TEST(RefinePoses, SamplesOfAnyNumberOfViewsTakeLittle) {
+    for (const std::size_t views : {1, 5, 10, 11, 100, 1000})
+        EXPECT_LE(std::max<std::uint64_t>(views, 10) * samplePixels(views) * 10, 41'000'000u)
+            << views;
+    EXPECT_EQ(samplePixels(7), 640u * 480u);
+}
+
 TEST(RefinePoses, CancelledIsAnError) {
     Bundle bundle = wall();
     Job job;
