@@ -63,7 +63,7 @@ const std::vector<SweepRule>& rules() {
         {"recorded-refine", "refining makes no picture of recorded views worse", 0.3, "dB",
          "as asked for pictures of some thousand pixels", 0.2, measures::refiningIsWorse},
         {"recorded-poses", "poses that are aligned make no picture of recorded views worse", 0.3,
-         "dB", "as asked for pictures of some thousand pixels", 0.2, measures::aligningIsWorse},
+         "dB", "as asked for pictures of some thousand pixels", 1, measures::aligningIsWorse},
         {"agree", "exact views agree about their distances", 0, "views",
          "what counts as one surface is far above what interpolation rounds", 1,
          measures::exactViewsDisagree},
