@@ -69,7 +69,11 @@ Json viewJson(const ReferenceView& view, glm::dvec3 origin) {
               {"farPlane", view.farPlane}};
     addLens(view.camera, j);
     j["noDepth"] = nameOf(view.noDepth);
-    if (!view.refined.steps.empty()) j["refined"] = view.refined.text();
+    if (!view.refined.steps.empty())
+        j["refined"] = Refined{view.refined.steps, view.refined.doubt}.text();
+    if (const auto& move = view.refined.moved)
+        j["moved"] = {{"shift", vectorJson(move->shift)},
+                      {"turn", {move->turn.w, move->turn.x, move->turn.y, move->turn.z}}};
     if (view.pruned) j["pruned"] = true;
     if (view.background) j["background"] = true;
     return j;

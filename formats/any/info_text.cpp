@@ -79,7 +79,7 @@ std::string setViewText(std::size_t number, const Json& v) {
 std::string viewText(std::size_t number, const Json& v) {
     return fmt::format(
         "view {} '{}': {}x{}, {}-bit depth {:.6g}..{:.6g}, {}, at {:.10g} {:.10g} "
-        "{:.10g}{}{}{}{}{}{}{}\n",
+        "{:.10g}{}{}{}{}{}{}{}{}\n",
         number, shown(v["name"]), shown(v["width"]), shown(v["height"]), shown(v["depthBits"]),
         v["nearPlane"].get<double>(), v["farPlane"].get<double>(), lensText(v),
         v["position"][0].get<double>(), v["position"][1].get<double>(),
@@ -89,7 +89,8 @@ std::string viewText(std::size_t number, const Json& v) {
         v.contains("emissive") ? ", emissive" : "",
         v.value("noDepth", "") == "unknown" ? ", no depth: unknown" : "",
         v.contains("refined") ? fmt::format(", refined ({})", shown(v["refined"])) : "",
-        v.contains("pruned") ? ", pruned" : "", v.contains("background") ? ", background" : "");
+        v.contains("moved") ? ", moved" : "", v.contains("pruned") ? ", pruned" : "",
+        v.contains("background") ? ", background" : "");
 }
 
 std::string streamText(const Json& s) {

@@ -22,7 +22,9 @@ Result<std::vector<Finding>> validateImageSet(const std::filesystem::path& path,
                          "the file");
     if (!findings.list.empty() || !options.pixels) return findings.list;
     auto views = [&]() -> Result<std::vector<Finding>> {
-        STX_TRY(const auto table, openSetViews(path, {}, job, heldOfSets(job.limits)));
+        ImageSetOptions asGiven;
+        asGiven.refine.set(RefineStep::poses, false);
+        STX_TRY(const auto table, openSetViews(path, asGiven, job, heldOfSets(job.limits)));
         return validateViews(*table, job);
     }();
     if (views) return views;
