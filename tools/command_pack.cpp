@@ -170,23 +170,30 @@ Result<int> packViews(const PackOptions& o, std::unique_ptr<ViewTable> views, Pa
     return 0;
 }
 
-/// One moment into one atlas. Views are looked at one by one, unless pictures of all are compared.
+/// Prunes views, if that is asked for. They are looked at one by one, unless pictures of all are
+/// compared.
+Result<std::optional<PrunedTo>> pruneViews(const PackOptions& o, const std::string& input,
+                                           std::unique_ptr<ViewTable>& views, Job& job) {
+    if (!prunes(o)) return std::optional<PrunedTo>();
+    if (o.minPsnr > 0) {
+        STX_TRY(auto bundle, wholeBundle(std::move(views), job));
+        STX_TRY(const auto report, pruneOne(bundle, o, input, job));
+        views = tableOf(std::move(bundle));
+        return PrunedTo{report, true};
+    }
+    auto pruning = findPruning(*views, o.pruning, job);
+    if (!pruning) return tl::unexpected(pruning.error().at(fmt::format("'{}'", input)));
+    const PrunedTo pruned{pruning->report};
+    views = prunedViews(std::move(views), std::move(*pruning));
+    return pruned;
+}
+
+/// One moment into one atlas.
 Result<int> packMoment(const PackOptions& o, Sequence& frames, std::size_t moment,
                        Program& program) {
     STX_TRY(auto views, frames.views(moment, program.job));
     const Stopwatch watch;
-    std::optional<PrunedTo> pruned;
-    if (o.minPsnr > 0) {
-        STX_TRY(auto bundle, wholeBundle(std::move(views), program.job));
-        STX_TRY(const auto report, pruneOne(bundle, o, o.input, program.job));
-        pruned = PrunedTo{report, true};
-        views = tableOf(std::move(bundle));
-    } else if (prunes(o)) {
-        auto pruning = findPruning(*views, o.pruning, program.job);
-        if (!pruning) return tl::unexpected(pruning.error().at(fmt::format("'{}'", o.input)));
-        pruned = PrunedTo{pruning->report};
-        views = prunedViews(std::move(views), std::move(*pruning));
-    }
+    STX_TRY(const auto pruned, pruneViews(o, o.input, views, program.job));
     return packViews(o, std::move(views), o.settings, pruned, watch, program);
 }
 
@@ -267,11 +274,11 @@ Result<std::vector<std::string>> objectNames(const PackOptions& o) {
     return names;
 }
 
-/// One input as an object: pruned, of one moment.
-Result<PackObject> openObject(const PackOptions& o, const std::string& input,
-                              const std::string& name, Job& job) {
+/// One input as an object: pruned, of one moment. Its views are read from `frames`.
+Result<PackTable> openObject(const PackOptions& o, const std::string& input,
+                             const std::string& name, std::unique_ptr<Sequence>& frames, Job& job) {
     preloadCodecs(input);
-    STX_TRY(auto frames, openSequence(input, o.open.into(o.output), job));
+    STX_TRY(frames, openSequence(input, o.open.into(o.output), job));
     STX_TRY(frames, refined(std::move(frames), o.refine, kPacking, folderOf(o.output)));
     const Timeline timeline = frames->timeline();
     std::size_t moment = 0;
@@ -283,14 +290,27 @@ Result<PackObject> openObject(const PackOptions& o, const std::string& input,
                         input, timeline.count());
         STX_TRY(moment, momentOf(o.time, timeline, nullptr, input, job));
     }
-    PackObject object;
+    PackTable object;
     object.name = name;
-    STX_TRY(object.bundle, frames->frame(moment, job));
-    if (prunes(o)) {
-        STX_TRY(const auto report, pruneOne(object.bundle, o, input, job));
-        object.sourcePixels = report.sourcePixels;
-    }
+    STX_TRY(object.views, frames->views(moment, job));
+    STX_TRY(const auto pruned, pruneViews(o, input, object.views, job));
+    if (pruned) object.sourcePixels = pruned->report.sourcePixels;
     return object;
+}
+
+/// What a report says of the objects of an atlas.
+void addObjectsOf(const Atlas& atlas, nlohmann::ordered_json& report) {
+    auto& listed = report["objects"] = nlohmann::ordered_json::array();
+    const double area = static_cast<double>(atlas.width()) * atlas.height() *
+                        static_cast<double>(atlas.pages.size());
+    for (const auto& object : atlas.objects)
+        listed.push_back(
+            {{"name", object.name},
+             {"views", object.views},
+             {"used",
+              static_cast<double>(coveredPixels(atlas.rectangles, object.firstView, object.views)) /
+                  area},
+             {"pixels", {{"source", object.sourcePixels}, {"kept", object.keptPixels}}}});
 }
 
 /// Several inputs into one atlas, each an object with a name.
@@ -305,44 +325,36 @@ Result<int> packSheet(const PackOptions& o, Program& program) {
     if (o.inputs.size() > 1 && (!o.budget.empty() || o.minPsnr > 0))
         program.job.note(
             fmt::format("{} is met by each object", o.budget.empty() ? "--min-psnr" : "--budget"));
-    std::vector<PackObject> objects;
-    std::uint64_t bytes = 0, pixels = 0;
+    std::vector<std::unique_ptr<Sequence>> frames(o.inputs.size());
+    std::vector<PackTable> objects;
+    std::uint64_t bytes = 0, held = 0;
     for (std::size_t i = 0; i < o.inputs.size(); ++i) {
         STX_CHECK(program.job.checkCancelled());
-        STX_TRY(auto object, openObject(o, o.inputs[i], names[i], program.job));
+        STX_TRY(auto object, openObject(o, o.inputs[i], names[i], frames[i], program.job));
         bytes += bytesOf(o.inputs[i]);
-        for (const auto& view : object.bundle.views) pixels += view.depth.count();
-        // A colour and a depth, until they are in the atlas.
-        STX_CHECK(program.job.limits.checkAllocation(pixels, 8, "the views of all objects"));
+        held += object.views->bytesHeld();
+        STX_CHECK(program.job.limits.checkAllocation(held, 1, "the views of all objects"));
         objects.push_back(std::move(object));
     }
-    STX_TRY(const auto joined, joinObjects(std::move(objects), program.job));
+    STX_TRY(auto joined, joinTables(std::move(objects), program.job));
     PackSettings settings = o.settings;
     settings.objects = &joined.objects;
     const AtlasSaveOptions save = saveOptions(o, program);
-    STX_TRY(const auto atlas,
-            packForFile(*viewsOf(joined.bundle), settings, o.output, save, program.job));
+    STX_TRY(auto atlas, packForFile(*joined.views, settings, o.output, save, program.job));
+    joined.views.reset();
     STX_CHECK(program.job.checkCancelled());
-    STX_CHECK(writeAtlas(atlas, o.output, program.job, save));
-    const double seconds = watch.seconds();
-    program.sayNotes();
-    program.say(fmt::format("{} ({}) → {} ({}), {}, {}", counted(names.size(), "object"),
-                            humanBytes(bytes), o.output, humanBytes(bytesOf(o.output)),
-                            summaryOf(atlas), humanSeconds(seconds)));
+    const std::string summary = summaryOf(atlas);
     nlohmann::ordered_json report = {
         {"$schema", "pack-report.schema.json"}, {"inputs", o.inputs}, {"output", o.output}};
-    addReportOf(atlas, seconds, report);
-    auto& listed = report["objects"] = nlohmann::ordered_json::array();
-    const double area = static_cast<double>(atlas.width()) * atlas.height() *
-                        static_cast<double>(atlas.pages.size());
-    for (const auto& object : atlas.objects)
-        listed.push_back(
-            {{"name", object.name},
-             {"views", object.views},
-             {"used",
-              static_cast<double>(coveredPixels(atlas.rectangles, object.firstView, object.views)) /
-                  area},
-             {"pixels", {{"source", object.sourcePixels}, {"kept", object.keptPixels}}}});
+    addReportOf(atlas, 0, report);
+    addObjectsOf(atlas, report);
+    STX_CHECK(writeAtlas(std::move(atlas), o.output, program.job, save));
+    const double seconds = watch.seconds();
+    report["seconds"] = seconds;
+    program.sayNotes();
+    program.say(fmt::format("{} ({}) → {} ({}), {}, {}", counted(names.size(), "object"),
+                            humanBytes(bytes), o.output, humanBytes(bytesOf(o.output)), summary,
+                            humanSeconds(seconds)));
     STX_CHECK(program.writeReport(report));
     return 0;
 }

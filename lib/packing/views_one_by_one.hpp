@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "lib/base/image.hpp"
@@ -13,6 +14,19 @@ namespace stx {
 
 /// As pack() of a bundle, of views that are looked at one by one, once, in the tight layout twice.
 [[nodiscard]] Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& job);
+
+/// As PackObject and JoinedObjects, of views that are looked at one by one.
+struct PackTable {
+    std::string name;  ///< not empty
+    std::unique_ptr<ViewTable> views;
+    std::int64_t sourcePixels = 0;  ///< as PackSettings::sourcePixels
+};
+struct JoinedTables {
+    std::unique_ptr<ViewTable> views;
+    std::vector<AtlasObject> objects;
+};
+/// As joinObjects(). Views are looked at once. Errors: also those of the views.
+[[nodiscard]] Result<JoinedTables> joinTables(std::vector<PackTable> objects, Job& job);
 
 /// What pruning keeps of each view.
 struct Pruning {

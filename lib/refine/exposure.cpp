@@ -11,6 +11,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
+#include "lib/geometry/near_views.hpp"
 
 namespace stx {
 namespace {
@@ -176,9 +177,16 @@ class SharedColoursFinder {
             if (!all) return std::nullopt;
         }
         // How much of each view another shows.
+        const auto lookFor = viewsToLookFor(
+            points_.size(), [&](std::size_t v) -> const Camera& { return cameras_[v]; },
+            [&](std::size_t v) {
+                std::vector<glm::dvec3> places;
+                for (const ColourPoint& point : points_[v]) places.push_back(point.world);
+                return ShownSphere::around(places);
+            });
         STX_TRY(const bool ranked, each_([&](std::size_t at) {
-                    for (std::size_t v = 0; v < points_.size(); ++v)
-                        if (v != at) keeps_ ? rankAndKeep(at, v) : rank(at, v);
+                    for (const std::size_t v : lookFor[at])
+                        keeps_ ? rankAndKeep(at, v) : rank(at, v);
                 }));
         if (!ranked) return std::nullopt;
         auto pairs = pairsThatShare(shown_);

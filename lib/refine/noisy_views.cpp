@@ -9,7 +9,8 @@ namespace {
 /// Every how many pixels the middle of a view is taken from, in both directions.
 constexpr int kMiddleStep = 7;
 
-/// The mean of the points of a view.
+}  // namespace
+
 glm::dvec3 middleOf(const NoisyView& view) {
     glm::dvec3 sum(0.0);
     std::int64_t points = 0;
@@ -24,8 +25,6 @@ glm::dvec3 middleOf(const NoisyView& view) {
     }
     return points > 0 ? sum / static_cast<double>(points) : view.space->camera.position;
 }
-
-}  // namespace
 
 std::vector<std::size_t> nearViews(std::span<const NoisyView> views, std::size_t number,
                                    std::size_t most) {

@@ -41,6 +41,9 @@ struct ShownSurface {
 [[nodiscard]] ShownSurface surfaceShownBy(const NoisyView& other, const Warp& warp, float x,
                                           float y, float q);
 
+/// The mean of the points of a view; without points the place of its camera.
+[[nodiscard]] glm::dvec3 middleOf(const NoisyView& view);
+
 /// The views that see the middle of the points of a view most as it does: see nearViews() of
 /// geometry.
 [[nodiscard]] std::vector<std::size_t> nearViews(std::span<const NoisyView> views,

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "lib/base/parallel.hpp"
+#include "lib/geometry/near_views.hpp"
 
 namespace stx {
 namespace {
@@ -15,6 +16,10 @@ namespace {
 /// Places are looked at up to so many standard deviations away, so many on each side.
 constexpr float kFarthestDoubts = 6.0f;
 constexpr int kPlaces = 16;
+/// Views that a view is held against. Spot from 256 places, depth with noise of 0.5 %, in dB of
+/// `best` and of splats: 47.05, 37.2 of 32; 47.4, 38.0 of 64; 47.6, 38.45 of 128; 47.7, 38.4 of
+/// all. The nearest 64 instead: 47.25, 37.1.
+constexpr std::size_t kMostWitnesses = 64;
 
 /// What a view shows between the middles of four pixels, (x, y) being the last of them.
 enum class Shown : std::uint8_t {
@@ -90,9 +95,14 @@ struct Witness {
     }
 };
 
-int countOf(const std::vector<Witness>& witnesses, float x, float y, float q) {
-    int count = 0;
-    for (const Witness& w : witnesses) count += w.seesBackground(x, y, q);
+/// How many see background at a point, or `most` where they are more.
+std::ptrdiff_t countOf(std::span<const Witness* const> witnesses, float x, float y, float q,
+                       std::ptrdiff_t most) {
+    std::ptrdiff_t count = 0;
+    for (const Witness* w : witnesses) {
+        count += w->seesBackground(x, y, q);
+        if (count >= most) break;
+    }
     return count;
 }
 
@@ -108,27 +118,41 @@ bool hasBackground(const Texture& texture, float freeLevel) {
 Image<float> kept(std::span<const NoisyView> views, std::span<const ShownMap> shown,
                   std::size_t number, const SilhouetteAlpha& alpha, PixelSpool* spool) {
     const NoisyView& view = views[number];
+    std::vector<std::size_t> telling{number};
+    for (std::size_t i = 0; i < views.size(); ++i)
+        if (i != number && !shown[i].empty()) telling.push_back(i);
+    const auto camera = [&](std::size_t k) -> const Camera& {
+        return views[telling[k]].space->camera;
+    };
     std::vector<Witness> witnesses;
-    for (std::size_t i = 0; i < views.size(); ++i) {
-        if (i == number || shown[i].empty()) continue;
+    for (const std::size_t k :
+         viewsAround(telling.size(), camera, 0, middleOf(view), kMostWitnesses)) {
+        const std::size_t i = telling[k];
         witnesses.push_back({views[i].texture, &shown[i], views[i].q->width(), views[i].q->height(),
                              warpFrom(views[i].space->pixelFromWorld * view.space->worldFromPixel),
                              alpha});
     }
+    std::vector<const Witness*> inOrder;
+    for (const Witness& w : witnesses) inOrder.push_back(&w);
     Image<float> out = *view.q;
     forRows(out, spool, [&](int y) {
+        std::vector<const Witness*> asked = inOrder;
         for (int x = 0; x < out.width(); ++x) {
             const float q = view.q->at(x, y), doubt = view.surface.at(x, y).z;
             if (!(q > 0.0f) || !(doubt > 0.0f)) continue;
             const float u = static_cast<float>(x) + 0.5f, v = static_cast<float>(y) + 0.5f;
-            int fewest = countOf(witnesses, u, v, q);
+            // Those that see background here come first: they are likely to see it nearby, too.
+            const auto others = std::partition(asked.begin(), asked.end(), [&](const Witness* w) {
+                return w->seesBackground(u, v, q);
+            });
+            std::ptrdiff_t fewest = others - asked.begin();
             float best = q;
             for (int k = 1; k <= 2 * kPlaces && fewest > 0; ++k) {
                 const auto steps = static_cast<float>((k + 1) / 2);
                 const float there =
                     q + (k % 2 ? -1.0f : 1.0f) * steps * (kFarthestDoubts / kPlaces) * doubt;
                 if (!(there > 0.0f)) continue;
-                const int count = countOf(witnesses, u, v, there);
+                const std::ptrdiff_t count = countOf(asked, u, v, there, fewest);
                 if (count >= fewest) continue;
                 fewest = count;
                 best = there;

@@ -23,6 +23,9 @@ struct DisagreementByView::State {
     };
     OverlapSettings settings;
     std::vector<OfView> views;
+    /// Which views each is to be compared with: found when all are sampled.
+    std::vector<std::vector<std::size_t>> lookFor;
+    std::once_flag known;  ///< `lookFor` is
     std::size_t left = 0;  ///< that compare() has not had yet
     std::mutex mutex;      ///< of `pairs`, `compared` and `left`
 
@@ -62,9 +65,15 @@ bool DisagreementByView::compare(std::size_t index, const Image<float>& depth,
         if (std::exchange(state.views[index].compared, true)) return false;
     }
     const DepthView to{&bundle.views[index], &depth};
-    for (std::size_t i = 0; i < state.views.size(); ++i) {
+    std::call_once(state.known, [&] {
+        const auto camera = [&](std::size_t i) -> const Camera& { return bundle.views[i].camera; };
+        state.lookFor = viewsToLookFor(state.views.size(), camera, [&](std::size_t i) {
+            return registration::sphereAround(state.views[i].probes, camera(i));
+        });
+    });
+    for (const std::size_t i : state.lookFor[index]) {
         const ViewHeader& own = bundle.views[i];
-        if (i == index || own.background != to.header->background) continue;
+        if (own.background != to.header->background) continue;
         State::OfView& from = state.views[i];
         const Pair pair{
             static_cast<int>(i), static_cast<int>(index),

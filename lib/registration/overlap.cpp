@@ -10,8 +10,7 @@ namespace {
 
 /// Neighbours whose distances differ by a larger share are not one surface.
 constexpr float kEdge = 0.05f;
-/// Points looked up per view and axis to find who overlaps: in few views, in many (each is held
-/// against each).
+/// Points looked up per view and axis to find who overlaps: in few views, in many.
 constexpr int kProbes = 24, kProbesOfMany = 10;
 constexpr std::size_t kMany = 64;
 
@@ -57,6 +56,15 @@ GridOfPoints gridOfPoints(const Image<float>& depth, int perAxis) {
         }
     }
     return grid;
+}
+
+ShownSphere sphereAround(const GridOfPoints& grid, const Camera& camera) {
+    const Pose pose(camera);
+    std::vector<glm::dvec3> points;
+    for (const GridOfPoints::Point& p : grid.points)
+        points.push_back(pose.position +
+                         pose.worldFromCamera * camera.unproject(p.x + 0.5, p.y + 0.5, p.own));
+    return ShownSphere::around(points);
 }
 
 CommonPoints commonPoints(const GridOfPoints& from, const Camera& own, const DepthView& to,
@@ -106,13 +114,17 @@ std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
         const DepthView& from = views[static_cast<std::size_t>(i)];
         auto& pairs = ofView[static_cast<std::size_t>(i)];
         const GridOfPoints grid = gridOfPoints(*from.depth, probesAmong(views.size()));
-        for (int j = 0; j < count; ++j) {
-            if (j == i) continue;
-            const DepthView& to = views[static_cast<std::size_t>(j)];
+        for (const std::size_t j : viewsThatMayShow(
+                 views.size(),
+                 [&](std::size_t n) -> const Camera& { return views[n].header->camera; },
+                 static_cast<std::size_t>(i), sphereAround(grid, from.header->camera),
+                 kMostCompared)) {
+            const DepthView& to = views[j];
             if (to.header->background != from.header->background) continue;
             const double overlap =
                 commonPoints(grid, from.header->camera, to, settings.overlapTolerance).overlap();
-            if (overlap >= settings.minOverlap) pairs.push_back({static_cast<int>(i), j, overlap});
+            if (overlap >= settings.minOverlap)
+                pairs.push_back({static_cast<int>(i), static_cast<int>(j), overlap});
         }
         std::stable_sort(pairs.begin(), pairs.end(),
                          [](const Pair& a, const Pair& b) { return a.overlap > b.overlap; });

@@ -6,6 +6,7 @@
 
 #include <glm/glm.hpp>
 
+#include "lib/geometry/near_views.hpp"
 #include "lib/registration/disagreement.hpp"
 
 namespace stx::registration {
@@ -38,6 +39,8 @@ struct GridOfPoints {
 };
 /// `perAxis`: about so many pixels along either side.
 [[nodiscard]] GridOfPoints gridOfPoints(const Image<float>& depth, int perAxis);
+/// Around the points of a view with that camera.
+[[nodiscard]] ShownSphere sphereAround(const GridOfPoints& grid, const Camera& camera);
 
 /// What two views both show, on a grid of pixels of the first.
 struct CommonPoints {
@@ -86,7 +89,8 @@ struct OfPair {
 [[nodiscard]] DepthDisagreement togetherOf(const std::vector<Pair>& pairs,
                                            const std::vector<OfPair>& found, std::size_t views);
 
-/// Pairs of overlapping views, both directions, in order of `from`, the widest overlaps first.
+/// Pairs of overlapping views, both directions, in order of `from`, the widest overlaps first. Each
+/// is looked for in kMostCompared others at most: viewsThatMayShow().
 [[nodiscard]] std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
                                                  const OverlapSettings& settings);
 

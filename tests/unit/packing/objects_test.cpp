@@ -1,7 +1,11 @@
+#include <tuple>
+#include <utility>
+
 #include <gtest/gtest.h>
 
 #include "lib/packing/packing.hpp"
 #include "lib/packing/rectangles.hpp"
+#include "lib/packing/views_one_by_one.hpp"
 #include "tests/small_bundle.hpp"
 
 namespace stx {
@@ -68,6 +72,36 @@ TEST(PackObjects, EachComesBackAsFromAnAtlasOfItsOwn) {
             EXPECT_EQ(object->pages[0].depth, own->pages[0].depth);
         }
         EXPECT_EQ(sheet->keptPixels, kept);
+    }
+}
+
+TEST(PackObjects, OfViewsOneByOneGiveTheSameAtlas) {
+    for (const auto layout : {PackSettings::Layout::grid, PackSettings::Layout::tight}) {
+        Job job;
+        const auto joined = joinObjects(threeObjects(), job);
+        ASSERT_TRUE(joined);
+        std::vector<PackTable> tables;
+        for (PackObject& object : threeObjects())
+            tables.push_back({object.name, tableOf(std::move(object.bundle))});
+        const auto views = joinTables(std::move(tables), job);
+        ASSERT_TRUE(views) << views.error().text();
+        PackSettings settings = settingsOf(layout, *joined);
+        const auto whole = pack(joined->bundle, settings, job);
+        settings.objects = &views->objects;
+        const auto each = pack(*views->views, settings, job);
+        ASSERT_TRUE(whole);
+        ASSERT_TRUE(each) << each.error().text();
+        EXPECT_EQ(each->rectangles, whole->rectangles);
+        EXPECT_EQ(*each->pages[0].texture.rgba8(), *whole->pages[0].texture.rgba8());
+        EXPECT_EQ(each->pages[0].depth, whole->pages[0].depth);
+        EXPECT_EQ(each->pages[0].normal, whole->pages[0].normal);
+        ASSERT_EQ(each->objects.size(), whole->objects.size());
+        for (std::size_t i = 0; i < each->objects.size(); ++i) {
+            const AtlasObject &a = each->objects[i], &b = whole->objects[i];
+            EXPECT_EQ(
+                std::tie(a.name, a.title, a.firstView, a.views, a.keptPixels, a.sourcePixels),
+                std::tie(b.name, b.title, b.firstView, b.views, b.keptPixels, b.sourcePixels));
+        }
     }
 }
 

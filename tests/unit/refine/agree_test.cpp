@@ -187,6 +187,35 @@ TEST(NoisyViews, PointsThatAreOutsideASilhouetteMoveIntoIt) {
     for (std::size_t k = 0; k < q.count(); ++k) ASSERT_EQ(q.data()[k], before.data()[k]);
 }
 
+TEST(NoisyViews, OfManySilhouettesThoseFromOtherSidesTell) {
+    // As above, with 70 more views from before, whose pictures have background in a corner.
+    constexpr std::size_t kBefore = 70;
+    constexpr float kDoubtShare = 0.03f;
+    std::vector<PixelSpace> spaces;
+    for (std::size_t i = 0; i <= kBefore; ++i)
+        spaces.push_back(spaceAt(0.001 * static_cast<double>(i)));
+    spaces.push_back(spaceAt(1.5707963));
+    Image<float> q(kPictureSide, kPictureSide), none(kPictureSide, kPictureSide, 0.0f);
+    Image<glm::vec3> surface(kPictureSide, kPictureSide);
+    forEachOnPlane(spaces[0], 1, [&](int x, int y, float there, glm::dvec3) {
+        q.at(x, y) = there;
+        surface.at(x, y) = {0, 0, kDoubtShare * there};
+    });
+    Rgba8Image corner(kPictureSide, kPictureSide, glm::u8vec4(255)),
+        strip(kPictureSide, kPictureSide, glm::u8vec4(0));
+    corner.at(0, 0) = glm::u8vec4(0);
+    for (int y = 0; y < kPictureSide; ++y)
+        for (int x = kPictureSide / 2 - 3; x < kPictureSide / 2 + 3; ++x)
+            strip.at(x, y) = glm::u8vec4(255);
+    const Texture before(corner), aside(strip);
+    std::vector<NoisyView> views{{&spaces[0], &before, &q, surface, 0}};
+    for (std::size_t i = 1; i < spaces.size(); ++i)
+        views.push_back({&spaces[i], i <= kBefore ? &before : &aside, &none, surface, 0});
+    keepInSilhouettes(views, kLevels);
+    const int middle = kPictureSide / 2;
+    EXPECT_LT(std::abs(kSheetDist - 1.0 / q.at(middle, middle)), 0.6);
+}
+
 TEST(NoisyViews, ColoursTellWhereASurfaceIs) {
     // All points of the first view are 1 % too far, as what smoothing leaves is alike around a
     // pixel.
