@@ -33,10 +33,11 @@ struct EdgeView {
 /// Takes a pixel off the surfaces in front, where stereo and filters of depth let them grow over
 /// what is behind, as long as edgesAreFat() and no other views deny it: of thin bars and fine
 /// textures a view alone cannot tell. Pixels whose own colour is that of the
-/// surface in front stay. A filter that gives each pixel the nearest depth around it moves slopes
-/// towards the camera, too: where the views agree clearly better on their surfaces then, every
-/// pixel gets the farthest depth around it instead. Gives by how many pixels; 0 = nothing was
-/// changed. New q of each view are in `spool`, if any. The same on any number of threads.
+/// surface in front stay, and so do those whose colour does not tell, where other views mostly have
+/// the colours of such pixels in front. A filter that gives each pixel the nearest depth around it
+/// moves slopes towards the camera, too: where the views agree clearly better on their surfaces
+/// with the farthest depth around each pixel, than as they are and than with the nearest, every
+/// pixel gets it instead. Gives by how many pixels; 0 = nothing was changed. New q of each view are in `spool`, if any. The same on any number of threads.
 int thinFatEdges(std::span<const EdgeView> views, PixelSpool* spool = nullptr);
 
 }  // namespace stx

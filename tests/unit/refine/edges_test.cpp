@@ -134,6 +134,17 @@ TEST(FatEdges, OnlyEdgesAreTakenBackWhereSlopesDidNotMove) {
     }
 }
 
+// The farthest of nine noisy distances differ less from view to view than the distances do.
+TEST(FatEdges, NoiseIsNotTakenForMovedSlopes) {
+    Bundle bundle = exactRoom();
+    displaceJumps(bundle);
+    noisy::addNoise(bundle, 0.001);
+    Room room(bundle);
+    const Room moved = room;
+    EXPECT_EQ(thinFatEdges(room.views(3)), 1);
+    for (std::size_t v = 0; v < 3; ++v) EXPECT_LT(wrong(room, moved, v, 1e-5f), 0.1);
+}
+
 TEST(FatEdges, ViewsOfOneColourTellNothing) {
     Bundle bundle = exactRoom();
     noisy::displaceEdges(bundle, 1);
