@@ -26,8 +26,7 @@ Result<SplatCloud> splatsOfTable(const ViewTable& table, const std::string& outp
     const PeakMemory& takes = settings.most > 0 ? peak::kFewerSplats : peak::kSplats;
     const std::uint64_t limit = job.limits.maxMemoryBytes, inMemory = memoryOfAll(table, takes);
     std::unique_ptr<FileSpool> spool;
-    if (settings.most == 0 && inMemory > limit &&
-        memoryOfSpooledSplats(table, job.limits) <= limit) {
+    if (inMemory > limit && memoryOfSpooledSplats(table, job.limits, settings.most) <= limit) {
         STX_TRY(spool, FileSpool::create(folderOf(output), limit / kSpoolPart));
     } else {
         std::uint64_t pixels = 0;

@@ -199,7 +199,7 @@ class CloudMaker {
 };
 
 Result<SplatCloud> cloudOf(std::vector<Image<Disc>> images, glm::dvec3 origin,
-                           const SplatSettings& settings, Job& job) {
+                           const SplatSettings& settings, PixelSpool* spool, Job& job) {
     CloudMaker maker(origin, settings.size);
     if (settings.most == 0) {
         std::size_t count = 0;
@@ -211,16 +211,18 @@ Result<SplatCloud> cloudOf(std::vector<Image<Disc>> images, glm::dvec3 origin,
         }
         return std::move(maker.cloud);
     }
-    const auto lists = splats::mergeDiscs(std::move(images), settings.most);
-    std::size_t count = 0;
-    for (const auto& list : lists) count += list.size();
-    if (count > settings.most)
+    const splats::DiscMerging merging(images, settings.most, spool);
+    if (merging.count() > settings.most)
         return fail(ErrorCode::failed,
                     "flat pieces of one colour merge into {} splats at the least, not into {}; "
                     "smaller or pruned views have fewer",
-                    count, settings.most);
-    STX_CHECK(maker.begin(count, job));
-    for (const auto& list : lists) maker.add(list);
+                    merging.count(), settings.most);
+    STX_CHECK(maker.begin(merging.count(), job));
+    for (Image<Disc>& image : images) {
+        STX_CHECK(job.checkCancelled());
+        merging.left(image, [&](const std::vector<Disc>& row) { maker.add(row); });
+        image = {};
+    }
     return std::move(maker.cloud);
 }
 
@@ -239,21 +241,24 @@ Result<SplatCloud> splatsOfBundle(Bundle bundle, const SplatSettings& settings, 
             withAxes(someViewsOf(*table, orderOf(std::as_const(*table).about()))));
     STX_TRY(auto images, finestDiscs(*ordered, settings, nullptr, job));
     table->about().views.clear();
-    return cloudOf(std::move(images), origin, settings, job);
+    return cloudOf(std::move(images), origin, settings, nullptr, job);
 }
 
 Result<SplatCloud> splatsOfViews(const ViewTable& table, const SplatSettings& settings,
                                  PixelSpool* spool, Job& job) {
     STX_TRY(const auto ordered, withAxes(someViewsOf(table, orderOf(table.about()))));
     STX_TRY(auto images, finestDiscs(*ordered, settings, spool, job));
-    return cloudOf(std::move(images), table.about().origin, settings, job);
+    return cloudOf(std::move(images), table.about().origin, settings, spool, job);
 }
 
-std::uint64_t memoryOfSpooledSplats(const ViewTable& table, const Limits& limits) {
-    // Of one view its axes and discs; at most all pixels are splats, and written ones are a copy.
+std::uint64_t memoryOfSpooledSplats(const ViewTable& table, const Limits& limits,
+                                    std::size_t most) {
+    // Of one view its axes and discs, or its discs and what they merge into; at most all pixels are
+    // splats, and written ones are a copy.
     constexpr PeakMemory kOfOne = {peak::kSplats.what, 2 * sizeof(Disc) + 40};
     std::uint64_t pixels = 0;
     for (std::size_t i = 0; i < table.count(); ++i) pixels += table.pixelsOf(i);
+    if (most > 0) pixels = std::min<std::uint64_t>(pixels, most);
     return std::max(memoryFromSpool(table, kOfOne, limits),
                     limits.maxMemoryBytes / kSpoolPart + pixels * SplatCloud::bytesEach(0));
 }

@@ -31,13 +31,14 @@ struct SplatSettings {
 /// not come down to `most`, with the least that they come to; memory over the limit, cancelled.
 [[nodiscard]] Result<SplatCloud> splatsOfBundle(Bundle bundle, const SplatSettings& settings,
                                                 Job& job);
-/// The same of views that are read one by one. What is known of each pixel is in a spool, if any,
-/// with `most` 0 only: then memory is taken for one view for each thread, and for the cloud.
+/// The same of views that are read one by one. What is known of each pixel is in a spool, if any:
+/// then memory is taken for one view for each thread, and for the cloud.
 /// Errors: also those of the views.
 [[nodiscard]] Result<SplatCloud> splatsOfViews(const ViewTable& table,
                                                const SplatSettings& settings, PixelSpool* spool,
                                                Job& job);
-/// Memory that it takes with a spool, what that holds included, bytes.
-[[nodiscard]] std::uint64_t memoryOfSpooledSplats(const ViewTable& table, const Limits& limits);
+/// Memory that it takes with a spool, what that holds included, bytes. `most`: of the settings.
+[[nodiscard]] std::uint64_t memoryOfSpooledSplats(const ViewTable& table, const Limits& limits,
+                                                  std::size_t most = 0);
 
 }  // namespace stx

@@ -311,7 +311,8 @@ def model_of_few(args, folder):
     """What is not the same, or takes too much, of a model of 36 views that do not fit memory."""
     wrong = []
     models_of = ((".exr", "glb", "", MODEL_LIMIT, MODEL), (".mp4", "glb", "", MODEL_LIMIT, MODEL),
-                 (".exr", "ply", "--as splats", SPLATS_LIMIT, SPLATS))
+                 (".exr", "ply", "--as splats", SPLATS_LIMIT, SPLATS),
+                 (".exr", "ply", "--as splats --max-splats 100000", SPLATS_LIMIT, SPLATS))
     for kind, ending, options, limit, most in models_of if os.path.exists(args.model) else ():
         name = f"few {kind} {ending} {options}"
         if args.only not in name:
