@@ -37,7 +37,8 @@ struct EdgeView {
 /// the colours of such pixels in front. A filter that gives each pixel the nearest depth around it
 /// moves slopes towards the camera, too: where the views agree clearly better on their surfaces
 /// with the farthest depth around each pixel, than as they are and than with the nearest, every
-/// pixel gets it instead. Gives by how many pixels; 0 = nothing was changed. New q of each view are in `spool`, if any. The same on any number of threads.
+/// pixel gets it instead. Gives by how many pixels; 0 = nothing was changed. New q of each view are
+/// in `spool`, if any. The same on any number of threads.
 int thinFatEdges(std::span<const EdgeView> views, PixelSpool* spool = nullptr);
 
 }  // namespace stx
