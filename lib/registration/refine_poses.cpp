@@ -37,8 +37,10 @@ constexpr double kColoursTell = 0.85, kLeastTold = 0.5 / 255, kDepthStays = 1.25
 /// recording 1.00.
 constexpr int kTrialSteps = 4;
 constexpr double kTrialTells = 0.95;
-/// Trackers are off by a degree; what turns views by more (radians) has found something else.
-constexpr double kMostTurn = 0.05;
+/// Trackers are off by a degree, and by a hundredth of the distance. What turns views by more
+/// (radians), or moves them by a larger share of it, has found something else: views that show the
+/// same picture, or hardly anything.
+constexpr double kMostTurn = 0.05, kMostShift = 0.03;
 /// Views whose depth is apart by a smaller share of the distance are exact, and so are their poses:
 /// programs' sets of tests/bench/pictures.md come to 0.002 %, recordings to 0.12 % and more.
 constexpr double kExact = 2e-4;
@@ -218,7 +220,7 @@ PoseRefinement stay(PoseRefinement result, const std::vector<Camera>& given,
                     std::vector<PoseSample>& views) {
     for (std::size_t i = 0; i < given.size(); ++i) views[i].header.camera = given[i];
     result.kept = false;
-    result.maxShift = result.maxTurn = 0;
+    result.maxShift = result.maxShiftShare = result.maxTurn = 0;
     return result;
 }
 
@@ -227,6 +229,7 @@ PoseRefinement stay(PoseRefinement result, const std::vector<Camera>& given,
 bool PoseRefinement::coloursTell() const {
     return coloursAfter < kColoursTell * coloursBefore &&
            coloursBefore - coloursAfter > kLeastTold && maxTurn < kMostTurn &&
+           maxShiftShare < kMostShift &&
            after.relative < kDepthStays * std::max(before.relative, kExact);
 }
 
@@ -254,6 +257,9 @@ Result<PoseRefinement> refinePoses(std::vector<PoseSample>& views,
     for (std::size_t i = 0; i < given.size(); ++i) {
         const CameraMove move = moveBetween(given[i], views[i].header.camera);
         result.maxShift = std::max(result.maxShift, glm::length(move.shift));
+        result.maxShiftShare =
+            std::max(result.maxShiftShare,
+                     glm::length(move.shift) / MovedCamera::of(views[i].header).distance);
         result.maxTurn = std::max(result.maxTurn, glm::angle(move.turn));
     }
     // Colours that do not fit the depth can draw the poses away from where the depth agrees.

@@ -155,7 +155,9 @@ TEST(IclNuim, NeighboursAreDrawnBetterThanByTheNaiveWarp) {
     ASSERT_TRUE(kind) << kind.error().text();
     EXPECT_EQ(*kind, "tum");
     Job job;
-    const auto bundle = readImageSet(set, {}, job);
+    ImageSetOptions asGiven;
+    asGiven.refine.set(RefineStep::poses, false);
+    const auto bundle = readImageSet(set, asGiven, job);
     ASSERT_TRUE(bundle) << bundle.error().text();
     for (const auto& note : job.takeNotes()) std::printf("  note: %s\n", note.c_str());
     ASSERT_EQ(bundle->views.size(), 5u);
@@ -164,9 +166,8 @@ TEST(IclNuim, NeighboursAreDrawnBetterThanByTheNaiveWarp) {
     EXPECT_EQ(view.camera.fy, 480.0);
     EXPECT_EQ(view.camera.cx, 320.0);
     EXPECT_EQ(view.camera.cy, 240.0);
-    ImageSetOptions refine;
-    refine.refine.set(RefineStep::poses, true);
-    const auto refined = readImageSet(set, refine, job);
+    // Poses are aligned by themselves.
+    const auto refined = readImageSet(set, {}, job);
     ASSERT_TRUE(refined) << refined.error().text();
     struct Pair {
         int from, to;
@@ -185,7 +186,7 @@ TEST(IclNuim, NeighboursAreDrawnBetterThanByTheNaiveWarp) {
         EXPECT_GE(warped.covered, pair.coverage);
         const auto aligned = between(*refined);
         print("  poses refined", aligned);
-        EXPECT_GE(aligned.psnr, pair.naive + 1.0);
+        EXPECT_GE(aligned.psnr, pair.naive + 12.0);
         EXPECT_GE(aligned.covered, pair.coverage);
     }
 }
