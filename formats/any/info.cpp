@@ -73,7 +73,7 @@ Json viewJson(const ReferenceView& view, glm::dvec3 origin) {
         j["refined"] = Refined{view.refined.steps, view.refined.doubt}.text();
     if (const auto& move = view.refined.moved)
         j["moved"] = {{"shift", vectorJson(move->shift)},
-                      {"turn", {move->turn.w, move->turn.x, move->turn.y, move->turn.z}}};
+                      {"turn", {move->turn.x, move->turn.y, move->turn.z, move->turn.w}}};
     if (view.pruned) j["pruned"] = true;
     if (view.background) j["background"] = true;
     return j;

@@ -10,6 +10,7 @@
 #include "lib/background/behind_photo.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/origin.hpp"
+#include "lib/model/depth_values.hpp"
 #include "lib/model/srgb8.hpp"
 #include "lib/registration/camera_moves.hpp"
 #include "lib/registration/disagreement.hpp"
@@ -23,12 +24,9 @@ Result<void> attendToPoses(Bundle& bundle, const ImageSetOptions& options,
                            RefineReport& report, Job& job) {
     const auto when = alignsPoses(bundle, options);
     if (when) {
-        std::vector<PoseSample> samples(bundle.views.size());
-        parallelFor(0, static_cast<std::int64_t>(samples.size()), [&](std::int64_t i) {
-            const auto at = static_cast<std::size_t>(i);
-            samples[at] = poseSampleOf(bundle.views[at], samplePixels(samples.size()));
-        });
-        STX_CHECK(alignCameras(bundle, std::move(samples), *when, each, subtracted, report, job));
+        STX_CHECK(alignCameras(bundle,
+                               poseSamplesOf(bundle.views, samplePixels(bundle.views.size())),
+                               *when, each, subtracted, report, job));
     }
     const bool aligned = when == AlignPoses::asked || posesWereAligned(bundle);
     if (const auto note = disagreementNote(bundle, measureDepthDisagreement(bundle), aligned))
@@ -147,16 +145,6 @@ Result<RefineReport> loadEach(
     return report;
 }
 
-Bounds togetherOf(const std::vector<Bounds>& each) {
-    Bounds all;
-    for (const Bounds& one : each) {
-        if (one.empty()) continue;
-        all.add(one.min);
-        all.add(one.max);
-    }
-    return all;
-}
-
 void makeNamesUnique(std::vector<ReferenceView>& views) {
     std::set<std::string> taken;
     for (ReferenceView& view : views) {
@@ -267,7 +255,7 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
         const auto at = static_cast<std::size_t>(i);
         each[at] = bundle.views[at].computeBounds();
     });
-    bundle.bounds = togetherOf(each);
+    bundle.bounds = boundsTogether(each);
     const glm::dvec3 subtracted = findOrigin(bundle, set, job);
     STX_CHECK(attendToPoses(bundle, options, each, subtracted, report, job));
     if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));

@@ -52,8 +52,6 @@ namespace stx::imagesets {
     const SetDescription& set, const std::string& where, const ImageSetOptions& options,
     std::size_t atOnce, Job& job, std::optional<std::size_t>* failing,
     const std::function<Result<void>(std::size_t index, std::vector<ReferenceView> views)>& take);
-/// The box around those that are not empty.
-[[nodiscard]] Bounds togetherOf(const std::vector<Bounds>& each);
 /// Names become part and file names: each is there once.
 void makeNamesUnique(std::vector<ReferenceView>& views);
 /// Colours of 8 bits become floats, of which they come back.

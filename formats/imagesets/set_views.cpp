@@ -9,6 +9,7 @@
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/read_views.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/model/depth_values.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "lib/registration/disagreement_by_view.hpp"
 
@@ -184,7 +185,7 @@ Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::s
     if (!set.environment.empty()) {
         STX_TRY(headers.environment, readEnvironmentExr(set.environment, job));
     }
-    headers.bounds = togetherOf(bounds);
+    headers.bounds = boundsTogether(bounds);
     const glm::dvec3 subtracted = findOrigin(headers, set, job);
     if (const auto when = alignsPoses(headers, options)) {
         looked.posesAsked = when == AlignPoses::asked;

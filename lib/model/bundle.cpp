@@ -98,13 +98,7 @@ Bounds Bundle::computeBounds() const {
     std::vector<Bounds> each(views.size());
     parallelFor(0, static_cast<std::int64_t>(views.size()),
                 [&](std::int64_t i) { each[i] = views[i].computeBounds(); });
-    Bounds all;
-    for (const auto& b : each) {
-        if (b.empty()) continue;
-        all.add(b.min);
-        all.add(b.max);
-    }
-    return all;
+    return boundsTogether(each);
 }
 
 namespace {

@@ -158,6 +158,16 @@ DepthSummary summariseDepth(std::span<const float> distances) {
     return summary;
 }
 
+Bounds boundsTogether(std::span<const Bounds> each) {
+    Bounds all;
+    for (const Bounds& one : each) {
+        if (one.empty()) continue;
+        all.add(one.min);
+        all.add(one.max);
+    }
+    return all;
+}
+
 Bounds boundsOfPoints(const Image<float>& distances, const Camera& camera) {
     const std::size_t beyond = HWY_DYNAMIC_DISPATCH(lanesOfBounds)();
     std::vector<double> columns(static_cast<std::size_t>(distances.width()) + beyond);

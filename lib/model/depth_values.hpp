@@ -23,6 +23,8 @@ struct DepthSummary {
 /// World bounds of the points of a depth image, to the bit those of ReferenceView::worldPoint();
 /// empty without a point.
 [[nodiscard]] Bounds boundsOfPoints(const Image<float>& distances, const Camera& camera);
+/// The box around those that are not empty.
+[[nodiscard]] Bounds boundsTogether(std::span<const Bounds> each);
 
 /// Replaces the distance of each point by that of its code: decode(encode()), to the bit.
 /// Precondition: `code` has farPlane > nearPlane, both finite.

@@ -60,7 +60,7 @@ struct Refined {
     std::optional<CameraMove> moved = {};  ///< by the step poses
 
     /// As containers keep it: "noise,agree 0.0031"; of a camera that was moved with the shift and
-    /// w, x, y, z of the turn behind it.
+    /// x, y, z, w of the turn behind it.
     [[nodiscard]] std::string text() const;
     /// Of such a text; none of others.
     [[nodiscard]] static std::optional<Refined> from(std::string_view text);

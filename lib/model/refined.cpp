@@ -33,7 +33,7 @@ std::string Refined::text() const {
     std::string out = fmt::format("{} {}", steps, doubt);
     if (moved)
         out += fmt::format(" {} {} {} {} {} {} {}", moved->shift.x, moved->shift.y, moved->shift.z,
-                           moved->turn.w, moved->turn.x, moved->turn.y, moved->turn.z);
+                           moved->turn.x, moved->turn.y, moved->turn.z, moved->turn.w);
     return out;
 }
 
@@ -52,7 +52,7 @@ std::optional<Refined> Refined::from(std::string_view text) {
     if (!more || (!more->empty() && more->size() != 7)) return std::nullopt;
     if (!more->empty()) {
         const std::vector<double>& n = *more;
-        const CameraMove move{{n[0], n[1], n[2]}, glm::dquat(n[3], n[4], n[5], n[6])};
+        const CameraMove move{{n[0], n[1], n[2]}, glm::dquat(n[6], n[3], n[4], n[5])};
         if (!(std::abs(glm::length(move.turn) - 1) <= kUnit)) return std::nullopt;
         out.moved = move;
     }

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "lib/base/cpu_clock.hpp"
-#include "lib/base/parallel.hpp"
 #include "lib/registration/camera_moves.hpp"
 #include "lib/registration/refine_poses.hpp"
 
@@ -63,12 +62,8 @@ Result<AlignedPoses> alignPoses(std::vector<PoseSample> views, AlignPoses when, 
 
 Result<RefineStepReport> alignPoses(Bundle& bundle, AlignPoses when, Job& job) {
     const double start = processMilliseconds();
-    std::vector<PoseSample> samples(bundle.views.size());
-    parallelFor(0, static_cast<std::int64_t>(samples.size()), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
-        samples[at] = poseSampleOf(bundle.views[at], samplePixels(samples.size()));
-    });
-    STX_TRY(AlignedPoses aligned, alignPoses(std::move(samples), when, job));
+    STX_TRY(AlignedPoses aligned,
+            alignPoses(poseSamplesOf(bundle.views, samplePixels(bundle.views.size())), when, job));
     for (std::size_t i = 0; i < bundle.views.size(); ++i)
         if (aligned.moves[i]) moveCamera(bundle.views[i], *aligned.moves[i]);
     aligned.report.milliseconds = processMilliseconds() - start;

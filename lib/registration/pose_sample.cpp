@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "lib/base/parallel.hpp"
 #include "lib/registration/overlap.hpp"
 
 namespace stx {
@@ -73,6 +74,16 @@ PoseSample poseSampleOf(const ReferenceView& view, std::uint64_t mostPixels) {
         }
     }
     return out;
+}
+
+std::vector<PoseSample> poseSamplesOf(const std::vector<ReferenceView>& views,
+                                      std::uint64_t mostPixels) {
+    std::vector<PoseSample> samples(views.size());
+    parallelFor(0, static_cast<std::int64_t>(samples.size()), [&](std::int64_t i) {
+        const auto at = static_cast<std::size_t>(i);
+        samples[at] = poseSampleOf(views[at], mostPixels);
+    });
+    return samples;
 }
 
 std::uint64_t samplePixels(std::size_t views) {

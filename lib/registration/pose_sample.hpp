@@ -26,6 +26,10 @@ struct PoseSample {
 [[nodiscard]] PoseSample poseSampleOf(
     const ReferenceView& view,
     std::uint64_t mostPixels = std::numeric_limits<std::uint64_t>::max());
+/// Of all of these views.
+[[nodiscard]] std::vector<PoseSample> poseSamplesOf(
+    const std::vector<ReferenceView>& views,
+    std::uint64_t mostPixels = std::numeric_limits<std::uint64_t>::max());
 
 /// Pixels that samples of so many views may have each: 640x480, fewer of more than ten views, so
 /// that all take 32 MB. Poses by samples of 160x120 lose 0.5 dB of what is drawn of a Kinect's

@@ -52,13 +52,7 @@ Bounds boundsOf(const std::vector<PoseSample>& views) {
         const auto at = static_cast<std::size_t>(i);
         each[at] = boundsOfPoints(views[at].depth, views[at].header.camera);
     });
-    Bounds all;
-    for (const Bounds& one : each) {
-        if (one.empty()) continue;
-        all.add(one.min);
-        all.add(one.max);
-    }
-    return all;
+    return boundsTogether(each);
 }
 
 }  // namespace

@@ -270,11 +270,7 @@ Result<PoseRefinement> refinePoses(std::vector<PoseSample>& views,
 
 Result<PoseRefinement> refinePoses(Bundle& bundle, const PoseRefinementSettings& settings,
                                    Job& job) {
-    std::vector<PoseSample> samples(bundle.views.size());
-    parallelFor(0, static_cast<std::int64_t>(samples.size()), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
-        samples[at] = poseSampleOf(bundle.views[at]);
-    });
+    std::vector<PoseSample> samples = poseSamplesOf(bundle.views);
     STX_TRY(PoseRefinement result, refinePoses(samples, settings, job));
     if (!result.kept || result.before.pairs == 0) return result;
     for (std::size_t i = 0; i < samples.size(); ++i) {

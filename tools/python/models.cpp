@@ -281,7 +281,7 @@ void bindModels(py::module_& module) {
             "coordinates.")
         .def_property_readonly(
             "up", [](const AnyModel& m) { return arrayOf(upOf(*m.model)); },
-            "(3,) float64, unit: what it stands on.")
+            "(3,) float64, unit: the direction that is up.")
         .def(
             "aligned",
             [](const AnyModel& m, const Camera& camera) { return alignedCamera(*m.model, camera); },
