@@ -26,6 +26,7 @@ struct ViewCommand {
         whileRefined,
         atSurfaces,  ///< at all, where the limit allows it; else at one at a time, from a spool
         atDiscs,     ///< the same
+        atGroups,    ///< at all, where the limit allows it; else at as many as it has room for
         atAll,
     } looks;
 };
@@ -49,7 +50,7 @@ constexpr ViewCommand kCommands[] = {
     {"extract -o NAME.ply", &peak::kPoints, &peak::kPoints, atRefined},
     {"extract -o NAME.ply --as splats", &peak::kSplats, &peak::kSplats, atDiscs},
     {"extract -o NAME.glb", &peak::kSurfaces, &peak::kSurfaces, atSurfaces},
-    {"extract -o NAME.html", &peak::kPage, &peak::kPage, atAll},
+    {"extract -o NAME.html", &peak::kPage, &peak::kPage, atGroups},
 };
 
 /// What commands take of views that may be refined before.
@@ -85,6 +86,8 @@ class MemoryOfCommands {
                 return withRefining(spooled(takes, memoryOfSpooledSurfaces(table_)));
             case atDiscs:
                 return withRefining(spooled(takes, memoryOfSpooledSplats(table_, limits_)));
+            case atGroups:
+                return withRefining(grouped(takes));
             case atAll:
                 break;
         }
@@ -111,6 +114,11 @@ class MemoryOfCommands {
             viewsBeside += table_.bytesOf(i);
         return {*grid + viewsBeside, !one};
     }
+    [[nodiscard]] Takes grouped(const PeakMemory& takes) const {
+        const std::uint64_t all = memoryOfAll(table_, takes);
+        const bool some = onDemand_ && (!refines_ || spooled_) && all > limits_.maxMemoryBytes;
+        return {some ? limits_.maxMemoryBytes : all, !some};
+    }
     [[nodiscard]] Takes spooled(const PeakMemory& takes, std::uint64_t inSpool) const {
         const std::uint64_t all = memoryOfAll(table_, takes);
         const bool one =
@@ -134,7 +142,9 @@ nlohmann::ordered_json memoryOf(const ViewTable& table, bool refines, const Limi
         const auto takes = memory.of(command, vectors ? *command.takesWithVectors : *command.takes);
         commands.push_back({{"command", command.words},
                             {"bytes", takes.bytes},
-                            {"views", takes.all ? "all" : "one for each thread"}});
+                            {"views", takes.all                   ? "all"
+                                      : command.looks == atGroups ? "as many as fit"
+                                                                  : "one for each thread"}});
     }
     return {{"threads", threadCount()}, {"commands", std::move(commands)}};
 }
@@ -184,7 +194,7 @@ std::string memoryText(const nlohmann::ordered_json& memory) {
     for (const auto& row : memory["commands"])
         out += fmt::format("  {:<32}{:>8}{}\n", row["command"].get_ref<const std::string&>(),
                            (row["bytes"].get<std::uint64_t>() + (1 << 20) - 1) >> 20,
-                           row["views"] == "all" ? "" : " *");
+                           row["views"] == "one for each thread" ? " *" : "");
     return out;
 }
 

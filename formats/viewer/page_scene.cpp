@@ -191,42 +191,16 @@ void makeViewable(Bundle& bundle, Job& job) {
     job.note("depth of 32 bits becomes 16 in the page");
 }
 
-Result<std::vector<Atlas>> packForPage(const Bundle& bundle, bool apart, Job& job) {
-    const auto packed = [&](const Bundle& views) {
-        PackSettings settings;
-        settings.layout = PackSettings::Layout::tight;
-        Result<Atlas> atlas = Atlas();
-        for (const int side : kSides) {
-            settings.maxSize = side;
-            atlas = pack(views, settings, job);
-            if (atlas || atlas.error().code == ErrorCode::failed) break;
-        }
-        return atlas;
-    };
-    const auto other = [&](const ReferenceView& v) {
-        return v.hasNormals() != bundle.views[0].hasNormals() ||
-               v.hasSplats() != bundle.views[0].hasSplats();
-    };
-    std::vector<Atlas> atlases;
-    // The textures of one scene all have the same images.
-    if (!apart || bundle.views.size() == 1 || std::ranges::any_of(bundle.views, other)) {
-        STX_TRY(auto atlas, packed(bundle));
-        atlases.push_back(std::move(atlas));
-        return atlases;
+Result<Atlas> packForPage(const Bundle& bundle, Job& job) {
+    PackSettings settings;
+    settings.layout = PackSettings::Layout::tight;
+    Result<Atlas> atlas = Atlas();
+    for (const int side : kSides) {
+        settings.maxSize = side;
+        atlas = pack(bundle, settings, job);
+        if (atlas || atlas.error().code == ErrorCode::failed) break;
     }
-    bool some = false;
-    for (const ReferenceView& view : bundle.views) {
-        Bundle one;
-        one.views.push_back(view);
-        atlases.emplace_back();
-        if (view.pointCount() == 0) continue;
-        STX_TRY(atlases.back(), packed(one));
-        some = true;
-    }
-    if (!some)
-        return fail(ErrorCode::invalidInput, "none of the {} views has a point",
-                    bundle.views.size());
-    return atlases;
+    return atlas;
 }
 
 void keepExactFiles(Bundle& bundle, const Limits& limits) {
@@ -234,59 +208,53 @@ void keepExactFiles(Bundle& bundle, const Limits& limits) {
         if (!isExact(view.colourFile, view.texture, limits)) view.colourFile = {};
 }
 
-Result<PageScene> pageScene(std::span<const Atlas> atlases, const PageColours& colours, Job& job) {
-    PageScene out;
-    Json& j = out.description;
-    bool pruned = false, partial = false;
-    Json views = Json::array(), rectangles = Json::array();
-    for (std::size_t number = 0; number < atlases.size(); ++number) {
-        const Atlas& atlas = atlases[number];
-        if (atlas.views.empty()) continue;
-        STX_CHECK(atlas.check());
-        j["padding"] = atlas.padding;
-        partial = partial || atlas.keptPixels < atlas.sourcePixels;
-        const auto firstView = static_cast<int>(views.size());
-        const auto firstPage = static_cast<int>(out.pages.size());
-        const bool ofViews =
-            colours.copies && std::ranges::all_of(atlas.views, [](const ReferenceView& v) {
-                return v.colourFile.jpeg != nullptr;
-            });
-        for (const ReferenceView& view : atlas.views) {
-            if (view.depthBits == 32)
-                return fail(ErrorCode::invalidInput,
-                            "the depth of a page has 8 or 16 bits, not 32");
-            pruned = pruned || view.pruned;
-            Json v = pageCamera(view.camera, view.name);
-            v["noDepth"] = nameOf(view.noDepth);
-            v["nearPlane"] = view.nearPlane;
-            v["farPlane"] = view.farPlane;
-            v["dmax"] = view.depthCode().dmax;
-            if (ofViews) v["colourAt"] = {view.colourFile.x, view.colourFile.y};
-            views.push_back(std::move(v));
-        }
-        for (const AtlasRectangle& r : atlas.rectangles)
-            rectangles.push_back({firstView + r.view, firstPage + r.page, r.viewX, r.viewY,
-                                  r.atlasX, r.atlasY, r.atlasWidth(), r.atlasHeight(),
-                                  r.turned ? 1 : 0});
-        std::vector<PageImages> pages(atlas.pages.size());
-        if (std::ranges::any_of(atlas.pages, [](const auto& p) { return !p.splatU.empty(); })) {
-            STX_TRY(pages, splatImages(atlas, job));
-        }
-        for (std::size_t i = 0; i < pages.size(); ++i) {
-            STX_CHECK(job.checkCancelled());
-            STX_TRY(auto images, imagesOf(atlas, i, colours, ofViews, job.limits));
-            pages[i].merge(images);
-            for (std::size_t k = 0; ofViews && i == 0 && k < atlas.views.size(); ++k)
-                pages[i][fmt::format("view{}", firstView + k)] = *atlas.views[k].colourFile.jpeg;
-            out.pages.push_back(std::move(pages[i]));
-            out.owners.push_back(number);
-        }
+Result<std::vector<PageImages>> PageScene::add(const Atlas& atlas, Job& job) {
+    std::vector<PageImages> pages(atlas.pages.size());
+    if (atlas.views.empty()) return pages;
+    STX_CHECK(atlas.check());
+    padding_ = atlas.padding;
+    partial_ = partial_ || atlas.keptPixels < atlas.sourcePixels;
+    const auto firstView = static_cast<int>(views_.size()), firstPage = static_cast<int>(pages_);
+    const bool ofViews = colours_.copies && std::ranges::all_of(atlas.views, [](const auto& v) {
+                             return v.colourFile.jpeg != nullptr;
+                         });
+    for (const ReferenceView& view : atlas.views) {
+        if (view.depthBits == 32)
+            return fail(ErrorCode::invalidInput, "the depth of a page has 8 or 16 bits, not 32");
+        pruned_ = pruned_ || view.pruned;
+        Json v = pageCamera(view.camera, view.name);
+        v["noDepth"] = nameOf(view.noDepth);
+        v["nearPlane"] = view.nearPlane;
+        v["farPlane"] = view.farPlane;
+        v["dmax"] = view.depthCode().dmax;
+        if (ofViews) v["colourAt"] = {view.colourFile.x, view.colourFile.y};
+        views_.push_back(std::move(v));
     }
-    j["pruned"] = pruned;
-    j["partial"] = partial;
-    j["views"] = std::move(views);
-    j["rectangles"] = std::move(rectangles);
-    return out;
+    for (const AtlasRectangle& r : atlas.rectangles)
+        rectangles_.push_back({firstView + r.view, firstPage + r.page, r.viewX, r.viewY, r.atlasX,
+                               r.atlasY, r.atlasWidth(), r.atlasHeight(), r.turned ? 1 : 0});
+    if (std::ranges::any_of(atlas.pages, [](const auto& p) { return !p.splatU.empty(); })) {
+        STX_TRY(pages, splatImages(atlas, job));
+    }
+    for (std::size_t i = 0; i < pages.size(); ++i) {
+        STX_CHECK(job.checkCancelled());
+        STX_TRY(auto images, imagesOf(atlas, i, colours_, ofViews, job.limits));
+        pages[i].merge(images);
+    }
+    for (std::size_t k = 0; ofViews && k < atlas.views.size(); ++k)
+        pages[0][fmt::format("view{}", firstView + k)] = *atlas.views[k].colourFile.jpeg;
+    pages_ += pages.size();
+    return pages;
+}
+
+Json PageScene::description() const {
+    Json j;
+    j["padding"] = padding_;
+    j["pruned"] = pruned_;
+    j["partial"] = partial_;
+    j["views"] = views_;
+    j["rectangles"] = rectangles_;
+    return j;
 }
 
 }  // namespace stx

@@ -27,31 +27,38 @@ struct PageColours {
     bool copies = false;
 };
 
-/// Views as the viewer reads them.
-struct PageScene {
-    nlohmann::ordered_json description;  ///< all but "pages", the numbers of the images
-    std::vector<PageImages> pages;
-    std::vector<std::size_t> owners;  ///< of each page: the number of the atlas that it is of
-};
-
 /// A bundle with 8-bit sRGB colour, which `what` ("the page") has. What is lossy is noted. `spool`,
 /// if any, is that of the bundle.
 void codeColours(Bundle& bundle, std::string_view what, Job& job, PixelSpool* spool = nullptr);
 /// A bundle with 8-bit sRGB colour and depth of 8 or 16 bits, as the viewer's textures hold them.
 /// What is lossy is noted.
 void makeViewable(Bundle& bundle, Job& job);
-/// The views of a bundle, which makeViewable() has seen, in textures as small as hold them; with
-/// `apart` those of each view in textures of their own, so that what did not change in the next
-/// frame is the same image. Then a view without content has none: an atlas without views. Errors:
+/// The views of a bundle, which makeViewable() has seen, in textures as small as hold them. Errors:
 /// those of pack().
-[[nodiscard]] Result<std::vector<Atlas>> packForPage(const Bundle& bundle, bool apart, Job& job);
+[[nodiscard]] Result<Atlas> packForPage(const Bundle& bundle, Job& job);
 /// Takes away the JPEG files of views whose colours are not exactly those that they decode to.
 void keepExactFiles(Bundle& bundle, const Limits& limits);
-/// All atlases as one scene; ColourFile of views have passed keepExactFiles(). Errors: one that
-/// fails check() but for those without views, linear colour or depth of 32 bits (invalidInput),
-/// memory.
-[[nodiscard]] Result<PageScene> pageScene(std::span<const Atlas> atlases,
-                                          const PageColours& colours, Job& job);
+
+/// Views as the viewer reads them, atlas by atlas.
+class PageScene {
+  public:
+    explicit PageScene(const PageColours& colours) : colours_(colours) {}
+
+    /// The images of the pages of an atlas, whose views come behind those that are there; one
+    /// without views has none. ColourFile of its views have passed keepExactFiles(). Errors: one
+    /// that fails check(), linear colour or depth of 32 bits (invalidInput), memory.
+    [[nodiscard]] Result<std::vector<PageImages>> add(const Atlas& atlas, Job& job);
+    /// What the viewer knows beside the numbers of the images, "pages".
+    [[nodiscard]] nlohmann::ordered_json description() const;
+
+  private:
+    PageColours colours_;
+    bool pruned_ = false, partial_ = false;
+    int padding_ = 0;
+    std::size_t pages_ = 0;
+    nlohmann::ordered_json views_ = nlohmann::ordered_json::array(),
+                           rectangles_ = nlohmann::ordered_json::array();
+};
 
 /// A vector, as JSON has it.
 [[nodiscard]] std::vector<double> listOf(glm::dvec3 v);

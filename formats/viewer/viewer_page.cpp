@@ -1,18 +1,19 @@
 #include "formats/viewer/viewer_page.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
-#include <tuple>
 
-#include "embedded_viewer.hpp"
 #include "formats/stx/stx.hpp"
 #include "formats/viewer/page_scene.hpp"
-#include "formats/viewer/page_text.hpp"
+#include "formats/viewer/page_writer.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/geometry/view_layout.hpp"
+#include "lib/model/depth_values.hpp"
 #include "lib/model/median_distance.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/model/view_table.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/render/scene/page_set.hpp"
 
@@ -23,8 +24,6 @@ using Json = nlohmann::ordered_json;
 
 /// Browsers need several times the size of a page to hold it.
 constexpr std::uint64_t kHard = 256ull << 20;
-/// Where what a page holds is put.
-constexpr std::string_view kDataMark = "@DATA@";
 /// Views that all look within this angle of their mean look at a scene, not around an object.
 constexpr double kSameSideCosine = 0.5;
 /// How far the eye goes to each side of a single view, as a share of the distance of what it turns
@@ -32,162 +31,32 @@ constexpr double kSameSideCosine = 0.5;
 constexpr double kSingleReach = 0.08;
 constexpr double kStartFovDeg = 40.0, kStartElevationDeg = 15.0;
 
-std::string textOf(const Json& json) {
-    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-std::string inHtml(std::string_view text) {
-    std::string out;
-    for (const char c : text) {
-        switch (c) {
-            case '&':
-                out += "&amp;";
-                break;
-            case '<':
-                out += "&lt;";
-                break;
-            case '>':
-                out += "&gt;";
-                break;
-            case '"':
-                out += "&quot;";
-                break;
-            default:
-                out += c;
-        }
-    }
-    // As JSON does it, what is not UTF-8 is replaced.
-    return Json::parse(textOf(out));
-}
-
-/// The program of the page, its shaders and its panel, packed.
-std::string packedProgram() {
-    Json texts;
-    for (const auto& [name, text] : {std::pair{"screen.vert", viewer::screen_vert},
-                                     {"prepare.frag", viewer::prepare_frag},
-                                     {"splat.vert", viewer::splat_vert},
-                                     {"splat.frag", viewer::splat_frag},
-                                     {"resolve.frag", viewer::resolve_frag},
-                                     {"pinholes.frag", viewer::pinholes_frag},
-                                     {"directions.frag", viewer::directions_frag},
-                                     {"outline.vert", viewer::outline_vert},
-                                     {"outline.frag", viewer::outline_frag},
-                                     {"silhouettes.frag", viewer::silhouettes_frag},
-                                     {"present.frag", viewer::present_frag}})
-        texts[name] = withoutComments(text);
-    std::string code = "\"use strict\";\nconst kPanel=" + Json(viewer::panel_html).dump() +
-                       ",kShaders=" + texts.dump() + ";\n";
-    for (const auto part : {viewer::png_js, viewer::camera_js, viewer::scene_js, viewer::painter_js,
-                            viewer::viewer_js})
-        code += withoutComments(part);
-    return packedPageText(code);
-}
-
-/// What a page writes as it goes.
-class PageWriter {
-  public:
-    PageWriter(OutputFile file, std::string_view title) : file_(std::move(file)) {
-        const std::string_view shell = viewer::viewer_html;
-        const std::size_t at = shell.find(kDataMark);
-        head_ = shell.substr(0, at);
-        end_ = shell.substr(at + kDataMark.size());
-        const auto put = [](std::string& part, std::string_view mark, const std::string& text) {
-            part.replace(part.find(mark), mark.size(), text);
-        };
-        put(head_, "@TITLE@", inHtml(title));
-        put(end_, "@UNPACK@", withoutComments(viewer::unpack_js));
-    }
-
-    Result<void> begin() {
-        STX_CHECK(write(kUtf16Mark));
-        return write(utf16Of(head_));
-    }
-
-    /// The number of a scene; that of the frame before when it is the same.
-    Result<int> add(std::size_t slot, PageScene scene) {
-        Json pages = Json::array();
-        if (slots_.size() <= slot) slots_.resize(slot + 1);
-        Slot& before = slots_[slot];
-        for (std::size_t i = 0; i < scene.pages.size(); ++i) {
-            Json numbers = Json::object();
-            const std::size_t owner = scene.owners[i];
-            const std::size_t page = i > 0 && scene.owners[i - 1] == owner ? 1 : 0;
-            for (auto& [name, bytes] : scene.pages[i]) {
-                Image& last = before.images[{owner, page, name}];
-                if (last.number < 0 || last.bytes != bytes) {
-                    last = {images_++, std::move(bytes)};
-                    report.imageBytes += last.bytes.size();
-                    STX_CHECK(element(fmt::format("image{}", last.number), pageText(last.bytes)));
-                }
-                numbers[name] = last.number;
-            }
-            pages.push_back(std::move(numbers));
-        }
-        scene.description["pages"] = std::move(pages);
-        std::string text = packedPageText(textOf(scene.description));
-        if (before.number >= 0 && before.text == text) return before.number;
-        before.text = std::move(text);
-        before.number = scenes_++;
-        STX_CHECK(element(fmt::format("scene{}", before.number), before.text));
-        return before.number;
-    }
-
-    Result<void> finish(const Json& data) {
-        STX_CHECK(element("data", packedPageText(textOf(data))));
-        STX_CHECK(element("code", packedProgram()));
-        STX_CHECK(write(utf16Of(end_)));
-        return file_.commit();
-    }
-
-    PageReport report;
-
-  private:
-    struct Image {
-        int number = -1;
-        Bytes bytes;
-    };
-    struct Slot {
-        /// By the atlas, its page and the name.
-        std::map<std::tuple<std::size_t, std::size_t, std::string>, Image> images;
-        int number = -1;
-        std::string text;
-    };
-
-    Result<void> write(std::string_view text) {
-        report.bytes += text.size();
-        return file_.write(text);
-    }
-    /// `text` as pageText() gives it.
-    Result<void> element(std::string_view id, std::string_view text) {
-        STX_CHECK(write(utf16Of(fmt::format("<script type=\"text/plain\" id=\"{}\">", id))));
-        STX_CHECK(write(text));
-        return write(utf16Of("</script>\n"));
-    }
-
-    OutputFile file_;
-    std::string head_, end_;
-    std::vector<Slot> slots_;
-    int images_ = 0, scenes_ = 0;
-};
-
 std::string titleOf(const PageOptions& options, const std::string& bundle) {
     if (!options.title.empty()) return options.title;
     return bundle.empty() ? std::filesystem::path(options.input).filename().string() : bundle;
 }
 
 Result<PageWriter> startPage(const std::filesystem::path& path, const PageOptions& options,
-                             const std::string& title) {
+                             const std::string& title, bool moves) {
     STX_TRY(auto file, OutputFile::create(path, options.output));
-    PageWriter writer(std::move(file), titleOf(options, title));
+    PageWriter writer(std::move(file), titleOf(options, title), moves);
     STX_CHECK(writer.begin());
     return writer;
 }
 
+/// What a page says of the points of its first frame.
+struct PagePoints {
+    std::int64_t count = 0;
+    Bounds bounds;
+    /// The first view that is not behind the others: how far away what it shows is, scene units,
+    /// and its near plane.
+    std::optional<double> distance;
+    double nearPlane = 0;
+};
+
 /// The pose of a single view, around whose median distance the page turns a little.
-Json startOfSingle(const ReferenceView& view) {
-    const Camera& c = view.camera;
-    const double distance = medianDistance(view);
-    const glm::dvec3 target = c.position + c.forward() * (distance > 0 ? distance : view.nearPlane);
+Json startOfSingle(const Camera& c, double distance, double nearPlane) {
+    const glm::dvec3 target = c.position + c.forward() * (distance > 0 ? distance : nearPlane);
     Json j;
     j["eye"] = listOf(c.position);
     j["target"] = listOf(target);
@@ -245,21 +114,19 @@ Result<Json> startOf(const std::vector<Camera>& cameras, const Bounds& bounds) {
 }
 
 /// What the page knows beside its scenes.
-Result<Json> dataOf(const std::vector<ReferenceView>& views, const Bounds& bounds,
-                    glm::dvec3 origin, const Timeline& line, const PageOptions& options,
-                    const PageReport& report) {
+Result<Json> dataOf(const std::vector<ReferenceView>& views, const PagePoints& points,
+                    glm::dvec3 origin, const Timeline& line, const PageOptions& options) {
     std::vector<Camera> cameras;
-    const ReferenceView* single = nullptr;
     Json listed = Json::array();
     for (const ReferenceView& view : views) {
         if (view.background) continue;
         cameras.push_back(view.camera);
-        single = cameras.size() == 1 && !view.camera.orthographic ? &view : nullptr;
         Json j = pageCamera(view.camera, view.name);
         const Camera& c = view.camera;
         j["fov"] = c.orthographic ? 0.0 : glm::degrees(2 * std::atan(0.5 * c.height / c.fy));
         listed.push_back(std::move(j));
     }
+    const bool single = cameras.size() == 1 && !cameras[0].orthographic;
     if (cameras.empty()) {
         for (const ReferenceView& view : views) cameras.push_back(view.camera);
     }
@@ -267,12 +134,12 @@ Result<Json> dataOf(const std::vector<ReferenceView>& views, const Bounds& bound
     j["version"] = 1;
     j["input"] = options.input;
     j["facts"] = fmt::format("{}, {}", counted(views.size(), "view"),
-                             counted(static_cast<std::size_t>(report.points), "point"));
+                             counted(static_cast<std::size_t>(points.count), "point"));
     j["origin"] = listOf(origin);
     if (single) {
-        j["start"] = startOfSingle(*single);
+        j["start"] = startOfSingle(cameras[0], points.distance.value_or(0), points.nearPlane);
     } else {
-        STX_TRY(j["start"], startOf(cameras, bounds));
+        STX_TRY(j["start"], startOf(cameras, points.bounds));
     }
     j["cameras"] = std::move(listed);
     j["times"] = line.times;
@@ -281,16 +148,145 @@ Result<Json> dataOf(const std::vector<ReferenceView>& views, const Bounds& bound
     return j;
 }
 
-/// Takes the views of one kind out of a bundle.
-Bundle takePart(Bundle& bundle, bool background) {
+/// Takes some views out of a bundle.
+Bundle takeViews(Bundle& bundle, const std::vector<std::size_t>& numbers) {
     Bundle out;
     out.title = bundle.title;
     out.origin = bundle.origin;
-    for (ReferenceView& view : bundle.views)
-        if (view.background == background) out.views.push_back(std::move(view));
-    std::erase_if(bundle.views,
-                  [&](const ReferenceView& view) { return view.background == background; });
+    for (const std::size_t i : numbers) out.views.push_back(std::move(bundle.views[i]));
     return out;
+}
+
+/// The views of a frame of a page, scene by scene and of each atlas by atlas: what is there now,
+/// then what is behind it; a set of background alone is drawn as any.
+using PageGroups = std::vector<std::vector<std::vector<std::size_t>>>;
+
+/// Memory of a view of a page beside what its table holds, bytes.
+std::uint64_t memoryOfPageView(const ViewTable& table, std::size_t index) {
+    return std::max(table.bytesToMake(index),
+                    table.bytesOf(index) + peak::kPage.perPixel * table.pixelsOf(index));
+}
+
+/// In films all views have atlases of their own, so that what did not change in the next frame is
+/// the same image. What stands still has one, or where memory does not hold all views as few as
+/// hold each as many as fit. The textures of one scene all have the same images: where views do not
+/// it is one, too.
+PageGroups pageGroups(const ViewTable& table, bool moves, const Limits& limits) {
+    const bool whole =
+        !moves && (table.whole() || memoryOfAll(table, peak::kPage) <= limits.maxMemoryBytes);
+    PageGroups out;
+    for (const bool background : {false, true}) {
+        std::vector<std::vector<std::size_t>> groups;
+        std::uint64_t taken = 0;
+        std::optional<ViewImageKinds> first;
+        bool alike = true;
+        std::vector<std::size_t> all;
+        for (std::size_t i = 0; i < table.count(); ++i) {
+            if (table.about().views[i].background != background) continue;
+            const ViewImageKinds& kinds = table.kindsOf(i);
+            if (!first) first = kinds;
+            alike =
+                alike && kinds.normal == first->normal && kinds.hasSplats() == first->hasSplats();
+            const std::uint64_t takes = memoryOfPageView(table, i);
+            if (all.empty() || moves || taken + takes > limits.maxMemoryBytes) {
+                groups.emplace_back();
+                taken = table.bytesHeld();
+            }
+            taken += takes;
+            groups.back().push_back(i);
+            all.push_back(i);
+        }
+        if (all.empty()) continue;
+        if (whole || !alike) groups = {std::move(all)};
+        out.push_back(std::move(groups));
+    }
+    return out;
+}
+
+/// The views of a frame, read as they are asked for.
+class PageViews {
+  public:
+    static Result<PageViews> of(std::unique_ptr<ViewTable> table, bool moves, Job& job) {
+        PageViews out;
+        out.groups_ = pageGroups(*table, moves, job.limits);
+        std::uint64_t most = 0, pixels = 0;
+        for (const auto& groups : out.groups_) {
+            for (const auto& group : groups) {
+                std::uint64_t takes = 0;
+                for (const std::size_t i : group) takes += memoryOfPageView(*table, i);
+                most = std::max(most, takes);
+            }
+        }
+        for (std::size_t i = 0; i < table->count(); ++i) pixels += table->pixelsOf(i);
+        STX_CHECK(
+            checkPeak({peak::kPage.what, 0}, pixels, 0, table->bytesHeld() + most, job.limits));
+        out.about_ = headersOf(std::as_const(*table).about());
+        if (table->whole() || (out.groups_.size() == 1 && out.groups_[0].size() == 1)) {
+            STX_TRY(out.bundle_, wholeBundle(std::move(table), job));
+        } else {
+            out.table_ = std::move(table);
+        }
+        return out;
+    }
+
+    /// Without images.
+    [[nodiscard]] const Bundle& about() const { return about_; }
+    [[nodiscard]] const PageGroups& groups() const { return groups_; }
+    /// Some of the views, once each.
+    Result<Bundle> take(const std::vector<std::size_t>& group, Job& job) {
+        if (!table_) return takeViews(bundle_, group);
+        std::vector<bool> wanted(table_->count());
+        for (const std::size_t i : group) wanted[i] = true;
+        STX_TRY(auto some, someViews(*table_, wanted, nullptr, job));
+        return takeViews(some, group);
+    }
+
+  private:
+    Bundle about_;
+    Bundle bundle_;  ///< all of them in memory, where there is no table
+    std::unique_ptr<ViewTable> table_;
+    PageGroups groups_;
+};
+
+/// Adds what views of the first frame say.
+void look(const Bundle& views, PagePoints& points) {
+    points.count += views.pointCount();
+    points.bounds = boundsTogether(std::array{points.bounds, views.computeBounds()});
+    for (const ReferenceView& view : views.views) {
+        if (view.background || points.distance) continue;
+        points.distance = medianDistance(view);
+        points.nearPlane = view.nearPlane;
+    }
+}
+
+/// Writes one scene of a frame and gives its number. `points`, if any, is added to.
+Result<int> writeScene(PageWriter& writer, std::size_t slot, PageViews& views,
+                       const PageOptions& options, PagePoints* points, Job& job) {
+    PageScene scene(options.colours);
+    Json pages = Json::array();
+    const auto& groups = views.groups()[slot];
+    for (std::size_t k = 0; k < groups.size(); ++k) {
+        STX_CHECK(job.checkCancelled());
+        STX_TRY(Bundle bundle, views.take(groups[k], job));
+        makeViewable(bundle, job);
+        if (options.colours.copies) keepExactFiles(bundle, job.limits);
+        if (points) look(bundle, *points);
+        // A view without content has no texture.
+        if (groups.size() > 1 && bundle.pointCount() == 0) continue;
+        STX_TRY(const Atlas atlas, packForPage(bundle, job));
+        bundle.views.clear();
+        STX_TRY(auto images, scene.add(atlas, job));
+        STX_CHECK(writer.addImages(slot, k, std::move(images), pages));
+    }
+    if (pages.empty()) return fail(ErrorCode::invalidInput, "none of the views has a point");
+    Json description = scene.description();
+    description["pages"] = std::move(pages);
+    return writer.addScene(slot, description);
+}
+
+PageReport reportOf(const PageWriter& writer, std::size_t views, std::int64_t points,
+                    std::size_t frames) {
+    return {views, points, frames, writer.imageBytes(), writer.bytes()};
 }
 
 void noteSize(const PageReport& report, Job& job) {
@@ -315,51 +311,44 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
     const Timeline& line = frames.timeline();
     std::optional<PageWriter> writer;
     Json scenes = Json::array(), data;
+    PagePoints points;
+    std::size_t count = 0;
     for (std::size_t i = 0; i < line.count(); ++i) {
         job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(line.count()),
                      "writing frames");
         STX_CHECK(job.checkCancelled());
-        STX_TRY(Bundle bundle, frames.frame(i, job));
-        STX_CHECK(checkPeak(peak::kPage, bundle.views, job.limits));
-        makeViewable(bundle, job);
-        if (options.colours.copies) keepExactFiles(bundle, job.limits);
-        if (!writer) {
-            bundle.noteMaterialLeftOut(job);
-            noteEnvironmentLeftOut(bundle.environment, job);
-            STX_TRY(writer, startPage(path, options, bundle.title));
-            writer->report.views = bundle.views.size();
-            writer->report.points = bundle.pointCount();
-            writer->report.frames = line.count();
-            STX_TRY(data,
-                    dataOf(bundle.views, bundle.bounds ? *bundle.bounds : bundle.computeBounds(),
-                           bundle.origin, line, options, writer->report));
+        STX_TRY(auto table, frames.views(i, job));
+        if (i == 0) {
+            noteMaterialLeftOut(*table, job);
+            noteEnvironmentLeftOut(std::as_const(*table).about().environment, job);
         }
-        // What is there now first, then what is behind it; a set of background alone is drawn as
-        // any.
+        STX_TRY(auto views, PageViews::of(std::move(table), line.moves(), job));
+        if (!writer) {
+            STX_TRY(writer, startPage(path, options, views.about().title, line.moves()));
+            count = views.about().views.size();
+        }
         Json numbers = Json::array();
-        std::vector<Bundle> parts;
-        parts.push_back(takePart(bundle, false));
-        parts.push_back(takePart(bundle, true));
-        std::erase_if(parts, [](const Bundle& b) { return b.views.empty(); });
-        for (std::size_t k = 0; k < parts.size(); ++k) {
-            STX_TRY(const auto atlases, packForPage(parts[k], line.moves(), job));
-            parts[k].views.clear();
-            STX_TRY(auto scene, pageScene(atlases, options.colours, job));
-            STX_TRY(const int number, writer->add(k, std::move(scene)));
+        for (std::size_t slot = 0; slot < views.groups().size(); ++slot) {
+            STX_TRY(const int number,
+                    writeScene(*writer, slot, views, options, i == 0 ? &points : nullptr, job));
             numbers.push_back(number);
         }
         scenes.push_back(std::move(numbers));
+        if (i > 0) continue;
+        if (views.about().bounds) points.bounds = *views.about().bounds;
+        STX_TRY(data, dataOf(views.about().views, points, views.about().origin, line, options));
     }
     data["frames"] = std::move(scenes);
     STX_CHECK(writer->finish(data));
-    noteSize(writer->report, job);
-    return writer->report;
+    const auto report = reportOf(*writer, count, points.count, line.count());
+    noteSize(report, job);
+    return report;
 }
 
 Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::path& path,
                                    const PageOptions& options, Job& job) {
     STX_CHECK(atlas.check());
-    // A single view tells its page by its depth how far away things are.
+    // A single view says by its depth how far away things are.
     const bool asItIs = atlas.views.size() > 1 && atlas.paddingHolds(PageSet::kPadding) &&
                         !atlas.pages[0].texture.isLinear() &&
                         std::ranges::none_of(atlas.views, [](const ReferenceView& v) {
@@ -370,20 +359,25 @@ Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::pa
         const auto still = sequenceOf(std::move(bundle));
         return writeViewerPage(*still, path, options, job);
     }
-    STX_TRY(auto writer, startPage(path, options, atlas.title));
-    writer.report.views = atlas.views.size();
-    writer.report.points = atlas.pointCount();
-    writer.report.frames = 1;
+    STX_TRY(auto writer, startPage(path, options, atlas.title, false));
     noteEnvironmentLeftOut(atlas.environment, job);
     STX_TRY(const PageSet set, PageSet::of(atlas, job));
-    STX_TRY(Json data,
-            dataOf(atlas.views, set.bounds(), atlas.origin, Timeline(), options, writer.report));
-    STX_TRY(auto scene, pageScene({&atlas, 1}, options.colours, job));
-    STX_TRY(const int number, writer.add(0, std::move(scene)));
+    PagePoints points;
+    points.count = atlas.pointCount();
+    points.bounds = set.bounds();
+    STX_TRY(Json data, dataOf(atlas.views, points, atlas.origin, Timeline(), options));
+    PageScene scene(options.colours);
+    Json pages = Json::array();
+    STX_TRY(auto images, scene.add(atlas, job));
+    STX_CHECK(writer.addImages(0, 0, std::move(images), pages));
+    Json description = scene.description();
+    description["pages"] = std::move(pages);
+    STX_TRY(const int number, writer.addScene(0, description));
     data["frames"] = {{number}};
     STX_CHECK(writer.finish(data));
-    noteSize(writer.report, job);
-    return writer.report;
+    const auto report = reportOf(writer, atlas.views.size(), points.count, 1);
+    noteSize(report, job);
+    return report;
 }
 
 }  // namespace stx

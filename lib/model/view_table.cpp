@@ -7,6 +7,19 @@
 #include "lib/base/parallel.hpp"
 
 namespace stx {
+
+Bundle headersOf(const Bundle& bundle) {
+    Bundle headers;
+    headers.title = bundle.title;
+    headers.origin = bundle.origin;
+    headers.bounds = bundle.bounds;
+    headers.environment = bundle.environment;
+    headers.time = bundle.time;
+    headers.duration = bundle.duration;
+    for (const ReferenceView& view : bundle.views)
+        static_cast<ViewHeader&>(headers.views.emplace_back()) = view;
+    return headers;
+}
 namespace {
 
 /// In what a view that came is not as its header was: found, and expected; empty where it is.
@@ -72,19 +85,6 @@ class SpooledViews : private OwnSpool, public ViewTable {
   private:
     std::uint64_t held_;
 };
-
-Bundle headersOf(const Bundle& bundle) {
-    Bundle headers;
-    headers.title = bundle.title;
-    headers.origin = bundle.origin;
-    headers.bounds = bundle.bounds;
-    headers.environment = bundle.environment;
-    headers.time = bundle.time;
-    headers.duration = bundle.duration;
-    for (const ReferenceView& view : bundle.views)
-        static_cast<ViewHeader&>(headers.views.emplace_back()) = view;
-    return headers;
-}
 
 std::vector<ViewImageKinds> kindsOf(const Bundle& bundle) {
     std::vector<ViewImageKinds> kinds;

@@ -98,6 +98,8 @@ class ViewTable {
     bool whole_ = false, planesKnown_ = true;
 };
 
+/// The same bundle without images: of its views what a ViewHeader has.
+[[nodiscard]] Bundle headersOf(const Bundle& bundle);
 /// A bundle in memory as a table. The second kind does not copy it; it must outlive the table.
 [[nodiscard]] std::unique_ptr<ViewTable> tableOf(Bundle bundle);
 [[nodiscard]] std::unique_ptr<ViewTable> viewsOf(const Bundle& bundle);

@@ -96,6 +96,9 @@ def models(test, browser, args):
     test.stx_run("extract", "amphora.mp4", "-o", "jpeg.html", "--colour", "jpeg")
     test.compare(browser, "amphora, with JPEG", "jpeg.html", "amphora.mp4", "1.5,1.2,2.5", "0,0.5,0")
     copied_pictures(test, browser)
+    # 16 views of 256² take 46 MiB for a page.
+    test.stx_run("extract", "amphora.mp4", "-o", "parts.html", "--max-memory", "16")
+    test.compare(browser, "amphora, with memory for a third of its views", "parts.html", "amphora.mp4", "1.5,1.2,2.5", "0,0.5,0")
     test.compare(browser, "amphora, from afar", "amphora.html", "amphora.mp4", "4,3,9", "0,0.5,0")
     test.compare(browser, "amphora, near", "amphora.html", "amphora.mp4", "0.9,1.1,1.1", "0.1,0.7,0")
 

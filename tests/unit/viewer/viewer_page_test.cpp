@@ -274,6 +274,60 @@ TEST(ViewerPage, WritesEachPictureOfAFilmOnce) {
     for (const Json& r : scene["rectangles"]) EXPECT_EQ(r[0], r[1]) << "each has its own page";
 }
 
+/// Views that are read when they are asked for.
+class OnDemand : public Sequence {
+  public:
+    explicit OnDemand(Bundle bundle) : bundle_(std::move(bundle)) {}
+    Result<Bundle> frame(std::size_t, Job&) override { return bundle_; }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t, Job&) override {
+        class Table : public ViewTable {
+          public:
+            explicit Table(const Bundle& all)
+                : ViewTable(headersOf(all),
+                            std::vector(all.views.size(), ViewImageKinds::of(all.views[0]))),
+                  all_(all) {}
+            Result<std::shared_ptr<const ReferenceView>> make(std::size_t index,
+                                                              Job&) const override {
+                return std::make_shared<const ReferenceView>(all_.views[index]);
+            }
+            const Bundle& all_;
+        };
+        return std::make_unique<Table>(bundle_);
+    }
+
+  private:
+    Bundle bundle_;
+};
+
+TEST(ViewerPage, HoldsAsManyViewsAsThereIsMemoryFor) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle bundle = smallBundle(7, 16, false, false);
+    bundle.views[3].background = true;
+    OnDemand views(bundle);
+    const PageOptions options{"a.exr", {}, {}, {}};
+    const auto whole = writeViewerPage(views, folder.path() / "whole.html", options, job);
+    // At 44 bytes a pixel the views take from 17 to 85 kB: four of the six, and the other two.
+    job.limits.maxMemoryBytes = 160'000;
+    const auto parts = writeViewerPage(views, folder.path() / "parts.html", options, job);
+    ASSERT_TRUE(whole && parts) << parts.error().text();
+    EXPECT_EQ(parts->points, whole->points);
+    EXPECT_EQ(parts->views, 7u);
+    const ReadPage one = readPage(folder.path() / "whole.html"),
+                   two = readPage(folder.path() / "parts.html");
+    EXPECT_EQ(one.json("data"), two.json("data"));
+    EXPECT_EQ(one.json("scene0")["views"], two.json("scene0")["views"]);
+    EXPECT_EQ(one.json("scene0")["pages"].size(), 1u);
+    EXPECT_EQ(two.json("scene0")["pages"].size(), 2u);
+    for (const Json& r : two.json("scene0")["rectangles"]) EXPECT_EQ(r[0].get<int>() / 4, r[1]);
+    EXPECT_EQ(one.json("scene1")["views"], two.json("scene1")["views"]) << "behind them";
+    job.limits.maxMemoryBytes = 60'000;
+    const auto none = writeViewerPage(views, folder.path() / "none.html", options, job);
+    ASSERT_FALSE(none);
+    EXPECT_EQ(none.error().code, ErrorCode::invalidInput);
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "none.html"));
+}
+
 TEST(ViewerPage, TakesAnAtlasAsItIs) {
     const TemporaryFolder folder;
     Job job;
