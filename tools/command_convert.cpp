@@ -11,8 +11,10 @@
 #include "formats/stx/mesh_views.hpp"
 #include "lib/base/stopwatch.hpp"
 #include "lib/render/around/around.hpp"
+#include "lib/render/factory.hpp"
 #include "tools/batch.hpp"
 #include "tools/commands.hpp"
+#include "tools/drawn_views.hpp"
 #include "tools/environment_options.hpp"
 #include "tools/mesh_views.hpp"
 #include "tools/photo_options.hpp"
@@ -123,21 +125,38 @@ Converted summaryOf(const Bundle& bundle, bool countPoints) {
     return done;
 }
 
+/// The six faces of views from one place, which are in a spool in `folder` meanwhile where memory
+/// does not hold them.
+Result<std::unique_ptr<ViewTable>> cubeOf(std::unique_ptr<ViewTable> table,
+                                          const std::filesystem::path& folder, Job& job) {
+    std::unique_ptr<FileSpool> spool;  // outlives the bundle
+    Bundle bundle;
+    if (table->whole()) {
+        STX_TRY(bundle, wholeBundle(std::move(table), job));
+    } else {
+        STX_TRY(bundle, viewsToDraw(*table, drawingMemory({}),
+                                    std::vector<bool>(table->count(), true), folder, spool, job));
+    }
+    STX_TRY(auto cube, cubeFromInside(bundle, job, spool.get()));
+    return tableOf(std::move(cube));
+}
+
 /// What is there of a bundle, with the changes that look at all of its views, if any.
 Result<std::unique_ptr<ViewTable>> changedAsAsked(std::unique_ptr<ViewTable> table, bool imported,
                                                   const std::filesystem::path& target,
                                                   const ConvertOptions& o, Program& program) {
     const auto bits = o.mesh->depthBits;
-    if (o.refining.steps == "auto" && !o.cube && !bits) return table;
-    if (!o.cube && !bits)
-        return o.refining.refined(std::move(table), imported, folderOf(target), program.job);
-    STX_TRY(auto bundle, wholeBundle(std::move(table), program.job));
-    STX_CHECK(o.refining.refine(bundle, imported, program.job));
-    if (o.cube) {
-        STX_TRY(bundle, cubeFromInside(bundle, program.job));
+    if (o.refining.steps != "auto") {
+        STX_TRY(table,
+                o.refining.refined(std::move(table), imported, folderOf(target), program.job));
     }
+    if (o.cube) {
+        STX_TRY(table, cubeOf(std::move(table), folderOf(target), program.job));
+    }
+    if (!bits) return table;
+    STX_TRY(auto bundle, wholeBundle(std::move(table), program.job));
     // Readers of image sets have said it for what they made.
-    if (bits && setDepthBits(bundle, *bits)) noteDepthLoss(bundle, program.job);
+    if (setDepthBits(bundle, *bits)) noteDepthLoss(bundle, program.job);
     return tableOf(std::move(bundle));
 }
 

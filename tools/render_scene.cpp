@@ -13,6 +13,7 @@
 #include "lib/model/splat_cloud.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "lib/render/factory.hpp"
+#include "tools/drawn_views.hpp"
 #include "tools/refining.hpp"
 
 namespace stx::tools {
@@ -66,36 +67,7 @@ Result<SwayPose> swayPose(const RenderOptions& o, Sequence& frames, const Job& j
     return swayPose(o.camera, bundle);
 }
 
-/// What drawing from a spool takes beside that, bytes: for each pixel of all views what is known of
-/// blocks, and beside its images for each of the view that a thread prepares.
-constexpr std::uint64_t kKnown = 2;
-constexpr PeakMemory kPreparing = {"drawing", 32};
-
-/// See someViews().
 using LookAtView = std::function<Result<void>(std::size_t index, const ReferenceView& view)>;
-
-/// Reads those of `wanted`, into a spool where they would take more memory than there may be.
-Result<Bundle> readViews(const RenderOptions& o, const PeakMemory& drawing, const ViewTable& table,
-                         const std::vector<bool>& wanted, const LookAtView& look,
-                         std::unique_ptr<FileSpool>& spool, Job& job) {
-    const std::uint64_t limit = job.limits.maxMemoryBytes;
-    std::uint64_t images = 0, inMemory = 0, pixels = 0;
-    for (std::size_t i = 0; i < table.count(); ++i) {
-        if (!wanted[i]) continue;
-        images += table.bytesOf(i);
-        inMemory += table.bytesOf(i) + drawing.perPixel * table.pixelsOf(i);
-        pixels += table.pixelsOf(i);
-    }
-    const std::uint64_t beside = memoryOfEach(table, kPreparing) + kKnown * pixels;
-    const std::uint64_t fromSpool = beside + beside / (kSpoolPart - 1);
-    if (inMemory > limit && inMemory > fromSpool) {
-        STX_CHECK(checkPeak({kPreparing.what, 0}, pixels, 0, fromSpool, job.limits));
-        STX_TRY(spool, FileSpool::create(folderBeside(o.output), limit / kSpoolPart));
-    } else if (auto ok = job.limits.checkAllocation(images, 1, "the views"); !ok) {
-        return tl::unexpected(ok.error().at(table.where()));
-    }
-    return someViews(table, wanted, spool.get(), job, look);
-}
 
 /// Whether the views of a table that is exact may be chosen by the pictures that are wanted:
 /// nothing looks at all of them first.
@@ -134,8 +106,9 @@ Result<void> openStill(const RenderOptions& o, const RenderSettings& settings, D
         STX_TRY(scene.model, wholeBundle(std::move(table), job));
         return {};
     }
-    STX_TRY(scene.model, readViews(o, drawingMemory(settings), *table,
-                                   std::vector<bool>(table->count(), true), {}, scene.spool, job));
+    STX_TRY(scene.model,
+            viewsToDraw(*table, drawingMemory(settings), std::vector<bool>(table->count(), true),
+                        folderBeside(o.output), scene.spool, job));
     return {};
 }
 
@@ -217,8 +190,9 @@ Result<void> makeStill(const RenderOptions& o, const RenderSettings& asked,
         };
         // Where all views are read their summaries tell nothing.
         const bool all = std::ranges::find(wanted, false) == wanted.end();
-        STX_TRY(scene.model, readViews(o, drawingMemory(settings), *scene.table, wanted,
-                                       all ? nullptr : LookAtView(check), scene.spool, job));
+        STX_TRY(scene.model,
+                viewsToDraw(*scene.table, drawingMemory(settings), wanted, folderBeside(o.output),
+                            scene.spool, job, all ? LookAtView() : LookAtView(check)));
         scene.table.reset();
         if (!all) {
             STX_TRY(scene.still, makeRenderer(std::get<Bundle>(scene.model), scene.summaries,

@@ -8,6 +8,7 @@ do not fit memory is the same.
     tests/cli/peak_test.py build/release/bin/stx MODEL.obj SHARED_DIR --only many --measure 1
 """
 import json
+import math
 import os
 import random
 import re
@@ -306,6 +307,47 @@ def noisy_of_many(args, folder):
     return wrong
 
 
+# Of a sensor that turned in place: views of 512², and a limit for a half of what they take in memory, MiB.
+TURNED_VIEWS, CUBE_LIMIT = 36, 80
+
+
+def turned_set(folder, count, side):
+    """A ball of 3 units from inside."""
+    os.makedirs(folder)
+    half = side / 2
+    png(os.path.join(folder, "c.png"), side, side, "rgb", lambda y: bytes(v for x in range(side) for v in (x * 255 // side, y * 255 // side, 90)))
+    png(os.path.join(folder, "d.png"), side, side, "depth", lambda y: struct.pack(
+        f">{side}H", *(round(15000 / math.sqrt(1 + ((x + 0.5) / half - 1) ** 2 + ((y + 0.5) / half - 1) ** 2)) for x in range(side))))
+    frames = []
+    for i in range(count):
+        sine, cosine = math.sin(2 * math.pi * i / count), math.cos(2 * math.pi * i / count)
+        frames.append({"file_path": "c.png", "depth_file_path": "d.png",
+                       "transform_matrix": [[cosine, 0, sine, 0], [0, 1, 0, 0], [-sine, 0, cosine, 0], [0, 0, 0, 1]]})
+    write(os.path.join(folder, "transforms.json"),
+          json.dumps({"w": side, "h": side, "fl_x": half, "fl_y": half, "cx": half, "cy": half, "integer_depth_scale": 0.0002, "frames": frames}))
+
+
+def cube_of_few(args, folder):
+    """What is not the same, or takes too much, of the cube of views that do not fit memory."""
+    wrong = []
+    if args.only not in "cube":
+        return wrong
+    turned_set(os.path.join(folder, "turned"), TURNED_VIEWS, 512)
+    must([args.stx, "convert", "turned", "-o", "turned.exr"], folder)
+    cubes = []
+    for limit in (NOISY_IN_MEMORY, CUBE_LIMIT):
+        done = must([args.stx, "convert", "turned.exr", "-o", f"cube{limit}.mp4", "--cube", "--threads", "2", "--max-memory", str(limit)], folder)
+        cubes.append(open(os.path.join(folder, f"cube{limit}.mp4"), "rb").read())
+        peak = done.usage.ru_maxrss / 1024
+        if args.measure:
+            print(f"cube {peak:6.1f} MiB at --max-memory {limit}", flush=True)
+        elif limit == CUBE_LIMIT and peak > limit + PROGRAM:
+            wrong.append(f"cube: {peak:.1f} MiB at --max-memory {limit}")
+    if cubes[0] != cubes[1]:
+        wrong.append("cube: it is not that of a larger --max-memory")
+    return wrong
+
+
 # Of surfaces and of splats of 36 views of 512² under limits for a fifth and a half of what is asked for them in memory, MiB:
 # what they may take, with the program. In memory they take 180 and 500.
 MODEL_LIMIT, MODEL = 140, 120
@@ -417,6 +459,7 @@ def main():
         wrong += model_of_few(args, folder)
         wrong += pruned_one_by_one(args, folder)
         wrong += noisy_of_many(args, folder)
+        wrong += cube_of_few(args, folder)
     print("\n".join(wrong))
     sys.exit(1 if wrong else 0)
 

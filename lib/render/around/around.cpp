@@ -199,7 +199,7 @@ ReferenceView viewOf(const Camera& camera, Frame frame, int depthBits) {
 
 }  // namespace
 
-Result<Bundle> cubeFromInside(const Bundle& bundle, Job& job) {
+Result<Bundle> cubeFromInside(const Bundle& bundle, Job& job, PixelSpool* spool) {
     STX_CHECK(bundle.check());
     Camera pose;
     int bits = 8;
@@ -236,7 +236,9 @@ Result<Bundle> cubeFromInside(const Bundle& bundle, Job& job) {
     RenderSettings settings;
     settings.fill = Fill::none;
     settings.ownEnvironment = false;
-    STX_TRY(const auto renderer, makeRenderer(Backend::cpu, bundle, settings, -1, job));
+    STX_TRY(const auto renderer, spool
+                                     ? makeRenderer(Backend::cpu, bundle, *spool, settings, -1, job)
+                                     : makeRenderer(Backend::cpu, bundle, settings, -1, job));
     Bundle cube;
     cube.title = bundle.title;
     cube.origin = bundle.origin;

@@ -25,8 +25,10 @@ inline constexpr std::array kFacesAround = {"front", "left", "back", "right", "u
 /// cube around it, seen from inside, in the world's axes: what several views show is merged, pixels
 /// are as dense as the densest view's in its middle. Faces that show nothing are left out. Errors
 /// (invalidInput): orthographic views; cameras that are further apart than a twentieth of the
-/// distance of what they see (above a two-hundredth it is noted).
-[[nodiscard]] Result<Bundle> cubeFromInside(const Bundle& bundle, Job& job);
+/// distance of what they see (above a two-hundredth it is noted). `spool`, if any, is that of the
+/// bundle; the faces are in memory.
+[[nodiscard]] Result<Bundle> cubeFromInside(const Bundle& bundle, Job& job,
+                                            PixelSpool* spool = nullptr);
 
 /// The cameras of those six faces: front, left, back, right, up, down, each 90 degrees and a pixel
 /// more on every side, with `half` pixels from the middle to 45 degrees.

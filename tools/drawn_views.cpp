@@ -1,0 +1,38 @@
+#include "tools/drawn_views.hpp"
+
+#include "lib/model/peak_memory.hpp"
+
+namespace stx::tools {
+namespace {
+
+/// What drawing from a spool takes beside that, bytes: for each pixel of all views what is known of
+/// blocks, and beside its images for each of the view that a thread prepares.
+constexpr std::uint64_t kKnown = 2;
+constexpr PeakMemory kPreparing = {"drawing", 32};
+
+}  // namespace
+
+Result<Bundle> viewsToDraw(
+    const ViewTable& table, const PeakMemory& drawing, const std::vector<bool>& wanted,
+    const std::filesystem::path& folder, std::unique_ptr<FileSpool>& spool, Job& job,
+    const std::function<Result<void>(std::size_t, const ReferenceView&)>& look) {
+    const std::uint64_t limit = job.limits.maxMemoryBytes;
+    std::uint64_t images = 0, inMemory = 0, pixels = 0;
+    for (std::size_t i = 0; i < table.count(); ++i) {
+        if (!wanted[i]) continue;
+        images += table.bytesOf(i);
+        inMemory += table.bytesOf(i) + drawing.perPixel * table.pixelsOf(i);
+        pixels += table.pixelsOf(i);
+    }
+    const std::uint64_t beside = memoryOfEach(table, kPreparing) + kKnown * pixels;
+    const std::uint64_t fromSpool = beside + beside / (kSpoolPart - 1);
+    if (inMemory > limit && inMemory > fromSpool) {
+        STX_CHECK(checkPeak({kPreparing.what, 0}, pixels, 0, fromSpool, job.limits));
+        STX_TRY(spool, FileSpool::create(folder, limit / kSpoolPart));
+    } else if (auto ok = job.limits.checkAllocation(images, 1, "the views"); !ok) {
+        return tl::unexpected(ok.error().at(table.where()));
+    }
+    return someViews(table, wanted, spool.get(), job, look);
+}
+
+}  // namespace stx::tools
