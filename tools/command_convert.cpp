@@ -10,15 +10,13 @@
 #include "formats/imagesets/patterns.hpp"
 #include "formats/stx/mesh_views.hpp"
 #include "lib/base/stopwatch.hpp"
-#include "lib/render/around/around.hpp"
-#include "lib/render/factory.hpp"
 #include "tools/batch.hpp"
 #include "tools/commands.hpp"
-#include "tools/drawn_views.hpp"
 #include "tools/environment_options.hpp"
 #include "tools/mesh_views.hpp"
 #include "tools/photo_options.hpp"
 #include "tools/refining.hpp"
+#include "tools/view_changes.hpp"
 #include "tools/view_tally.hpp"
 
 namespace stx::tools {
@@ -125,26 +123,11 @@ Converted summaryOf(const Bundle& bundle, bool countPoints) {
     return done;
 }
 
-/// The six faces of views from one place, which are in a spool in `folder` meanwhile where memory
-/// does not hold them.
-Result<std::unique_ptr<ViewTable>> cubeOf(std::unique_ptr<ViewTable> table,
-                                          const std::filesystem::path& folder, Job& job) {
-    std::unique_ptr<FileSpool> spool;  // outlives the bundle
-    Bundle bundle;
-    if (table->whole()) {
-        STX_TRY(bundle, wholeBundle(std::move(table), job));
-    } else {
-        STX_TRY(bundle, viewsToDraw(*table, drawingMemory({}),
-                                    std::vector<bool>(table->count(), true), folder, spool, job));
-    }
-    STX_TRY(auto cube, cubeFromInside(bundle, job, spool.get()));
-    return tableOf(std::move(cube));
-}
-
-/// What is there of a bundle, with the changes that look at all of its views, if any.
+/// What is there of a bundle, with the changes that were asked for, if any.
 Result<std::unique_ptr<ViewTable>> changedAsAsked(std::unique_ptr<ViewTable> table, bool imported,
                                                   const std::filesystem::path& target,
-                                                  const ConvertOptions& o, Program& program) {
+                                                  const ConvertOptions& o, LargestStep& step,
+                                                  Program& program) {
     const auto bits = o.mesh->depthBits;
     if (o.refining.steps != "auto") {
         STX_TRY(table,
@@ -153,11 +136,11 @@ Result<std::unique_ptr<ViewTable>> changedAsAsked(std::unique_ptr<ViewTable> tab
     if (o.cube) {
         STX_TRY(table, cubeOf(std::move(table), folderOf(target), program.job));
     }
-    if (!bits) return table;
-    STX_TRY(auto bundle, wholeBundle(std::move(table), program.job));
     // Readers of image sets have said it for what they made.
-    if (setDepthBits(bundle, *bits)) noteDepthLoss(bundle, program.job);
-    return tableOf(std::move(bundle));
+    if (!bits || std::ranges::all_of(std::as_const(*table).about().views,
+                                     [&](const auto& v) { return v.depthBits == *bits; }))
+        return table;
+    return changedViews(std::move(table), withDepthBits(*bits, step));
 }
 
 /// One moment, of which each view is written when it is there.
@@ -174,6 +157,7 @@ Result<Converted> convertStill(const std::filesystem::path& input,
     }
     Converted done;
     ViewTally tally;
+    LargestStep step;
     const auto save = [&](std::unique_ptr<ViewTable> table, Job& job) -> Result<void> {
         if (o.environment.given()) table->about().environment = environment;
         if (mesh) table->about().title = input.stem().string();
@@ -194,9 +178,10 @@ Result<Converted> convertStill(const std::filesystem::path& input,
         if (auto saved = withMeshViews(*mesh, *o.mesh, program, save); !saved)
             return tl::unexpected(saved.error().at(fmt::format("'{}'", input.string())));
     } else {
-        STX_TRY(auto table,
-                changedAsAsked(std::move(std::get<1>(opened)), *imported, target, o, program));
+        STX_TRY(auto table, changedAsAsked(std::move(std::get<1>(opened)), *imported, target, o,
+                                           step, program));
         STX_CHECK(save(std::move(table), program.job));
+        noteDepthLoss(step.largest(), program.job);
     }
     done.points += tally.points();
     return done;

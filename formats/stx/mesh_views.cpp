@@ -131,13 +131,15 @@ Result<Bundle> captureViews(const Mesh& mesh, const std::vector<Camera>& cameras
 
 bool setDepthBits(Bundle& bundle, int bits) {
     bool changed = false;
-    for (auto& view : bundle.views) {
-        if (view.depthBits == bits) continue;
-        view.depthBits = bits;
-        fitDepthRange(view);
-        changed = true;
-    }
+    for (auto& view : bundle.views) changed = setDepthBits(view, bits) || changed;
     return changed;
+}
+
+bool setDepthBits(ReferenceView& view, int bits) {
+    if (view.depthBits == bits) return false;
+    view.depthBits = bits;
+    fitDepthRange(view);
+    return true;
 }
 
 void noteDepthLoss(const Bundle& bundle, Job& job) {

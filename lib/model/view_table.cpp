@@ -105,7 +105,10 @@ class ChangedViews : public ViewTable {
         // What a change may do to the planes shows in its views only.
         : ViewTable(headersOf(std::as_const(*table).about()), std::move(kinds), Planes::withPixels),
           table_(std::move(table)),
-          change_(std::move(change)) {}
+          change_(std::move(change)) {
+        if (change_.header)
+            for (ReferenceView& view : about().views) change_.header(view);
+    }
 
     std::uint64_t bytesHeld() const override { return table_->bytesHeld(); }
     std::uint64_t bytesToMake(std::size_t index) const override {

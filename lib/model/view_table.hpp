@@ -130,6 +130,8 @@ struct ViewChange {
     std::function<Result<void>(ReferenceView& view, Job& job)> change;
     /// Adds the images that a changed view has more.
     std::function<void(ViewImageKinds& kinds)> kinds;
+    /// Changes what is known of a view before its pixels are: all but name, size and planes.
+    std::function<void(ViewHeader& header)> header;
     /// What it takes beside the view, with what it adds.
     PeakMemory takes;
     /// Colours and depth stay, too: what is kept of the views (ViewTable::summaries()) stays true.

@@ -120,6 +120,7 @@ def of_many():
     yield "exr to exr", "convert {}.exr -o OUT.exr"
     yield "exr to mp4", "convert {}.exr -o OUT.mp4"
     yield "exr to bt", "convert {}.exr -o OUT.bt"
+    yield "exr to 8 bits", "convert {}.exr -o OUT.mp4 --depth-bits 8"
     yield "mp4 to exr", "convert {}.mp4 -o OUT.exr"
     for kind in ("exr", "mp4"):
         yield f"bake {kind}", f"bake {{}}.{kind} -o OUT.{kind}"

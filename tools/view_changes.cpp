@@ -1,0 +1,35 @@
+#include "tools/view_changes.hpp"
+
+#include "formats/stx/mesh_views.hpp"
+#include "lib/render/around/around.hpp"
+#include "lib/render/factory.hpp"
+#include "tools/drawn_views.hpp"
+
+namespace stx::tools {
+
+ViewChange withDepthBits(int bits, LargestStep& step) {
+    ViewChange change;
+    change.change = [bits, &step](ReferenceView& view, Job&) -> Result<void> {
+        setDepthBits(view, bits);
+        if (bits == 8) step.add(view.depthCode().step());
+        return {};
+    };
+    change.header = [bits](ViewHeader& header) { header.depthBits = bits; };
+    return change;
+}
+
+Result<std::unique_ptr<ViewTable>> cubeOf(std::unique_ptr<ViewTable> table,
+                                          const std::filesystem::path& folder, Job& job) {
+    std::unique_ptr<FileSpool> spool;  // outlives the bundle
+    Bundle bundle;
+    if (table->whole()) {
+        STX_TRY(bundle, wholeBundle(std::move(table), job));
+    } else {
+        STX_TRY(bundle, viewsToDraw(*table, drawingMemory({}),
+                                    std::vector<bool>(table->count(), true), folder, spool, job));
+    }
+    STX_TRY(auto cube, cubeFromInside(bundle, job, spool.get()));
+    return tableOf(std::move(cube));
+}
+
+}  // namespace stx::tools
