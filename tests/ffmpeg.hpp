@@ -70,5 +70,5 @@ inline void writeCodes(const std::filesystem::path& file, int count, int width, 
 #define REQUIRE_VIDEO()                                                       \
     if (!films::haveFfmpeg())                                                 \
         GTEST_SKIP() << "needs the program ffmpeg (Debian's package ffmpeg)"; \
-    if (const auto videoHere = stx::videoModule(); !videoHere.present)        \
-    GTEST_SKIP() << videoHere.reason
+    if (const auto video = stx::VideoProcess::start(stx::Limits()); !video)   \
+    GTEST_SKIP() << video.error().message

@@ -21,7 +21,7 @@ enum class ExtractAs { points, splats, surfaces, rgbd, pair };
 
 /// `stx extract` into a file of splats, or of a film into one for each frame where `output` has a
 /// number (%04d): says what was written and reports it. Errors: those of momentOf(), of the input,
-/// splatsOfBundle() and writeSplats().
+/// splatsOfViews() and writeSplats().
 [[nodiscard]] Result<int> extractSplats(const std::string& input, const OpenOptions& open,
                                         const std::string& output,
                                         const std::optional<double>& time,

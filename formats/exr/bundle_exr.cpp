@@ -346,11 +346,6 @@ const char* ExrBundleHeader::nodeKind() const {
     return v2 ? "SimpleTextureV2" : "SimpleTexture";
 }
 
-Result<void> writeExrBundle(const Bundle& bundle, OutputFile& file, Job& job) {
-    STX_CHECK(bundle.checkHeaders());
-    return writeTable(*viewsOf(bundle), {}, file, job);
-}
-
 Result<void> writeExrViews(const ViewTable& table, const std::filesystem::path& path, Job& job,
                            OutputFile::Options options, const Summarise& summarise) {
     if (table.whole()) STX_CHECK(table.about().checkHeaders());
@@ -358,11 +353,6 @@ Result<void> writeExrViews(const ViewTable& table, const std::filesystem::path& 
     if (auto ok = writeTable(table, summarise, file, job); !ok)
         return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
     return file.commit();
-}
-
-Result<void> writeExrBundle(const Bundle& bundle, const std::filesystem::path& path, Job& job,
-                            OutputFile::Options options) {
-    return writeExrViews(*viewsOf(bundle), path, job, options);
 }
 
 Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {

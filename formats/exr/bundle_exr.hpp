@@ -53,21 +53,16 @@ struct ExrBundleHeader {
 /// Cameras are in the standard attributes worldToCamera, worldToNDC, screenWindowCenter and
 /// screenWindowWidth (float, for other programs) and exactly in `stx:` ones (see bundle_exr.cpp).
 /// The environment is a part of its own (environment_exr.hpp).
+/// Views are written when they come: what their headers say of pixels (planes, points, bounds) is
+/// put into the file at the end. `summarise`, if any: see SaveOptions.
 /// Errors: what Bundle::check() says; files.
 // clang-format on
-[[nodiscard]] Result<void> writeExrBundle(const Bundle& bundle, OutputFile& file, Job& job);
-/// The same with creating and committing the file.
-[[nodiscard]] Result<void> writeExrBundle(const Bundle& bundle, const std::filesystem::path& path,
-                                          Job& job, OutputFile::Options options = {});
-/// The same bytes of views that are written when they come: what their headers say of pixels
-/// (planes, points, bounds) is put into the file at the end.
-/// `summarise`, if any: see SaveOptions.
 [[nodiscard]] Result<void> writeExrViews(
     const ViewTable& table, const std::filesystem::path& path, Job& job,
     OutputFile::Options options = {},
     const std::function<ViewSummary(const ReferenceView&)>& summarise = {});
 
-/// Reads what writeExrBundle() wrote. Parts of other programs are views, too, when they have Z and
+/// Reads what writeExrViews() wrote. Parts of other programs are views, too, when they have Z and
 /// worldToCamera; their planes are fitted to their depth, and distances of 1e9 and more, NaN and
 /// those below 0 are not points. The result passes Bundle::check().
 [[nodiscard]] Result<Bundle> readExrBundle(ByteSpan bytes, std::string_view name, Job& job);

@@ -56,15 +56,6 @@ ByteSource ByteSource::fromShared(std::shared_ptr<const Bytes> bytes) {
     return source;
 }
 
-ByteSource ByteSource::fromView(ByteSpan bytes) {
-    auto impl = std::make_shared<Impl>();
-    impl->memory = bytes;
-    impl->size = bytes.size();
-    ByteSource source;
-    source.impl_ = std::move(impl);
-    return source;
-}
-
 std::uint64_t ByteSource::size() const {
     return impl_ ? impl_->size : 0;
 }

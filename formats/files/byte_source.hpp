@@ -20,8 +20,6 @@ class ByteSource {
     [[nodiscard]] static Result<ByteSource> open(const std::filesystem::path& path);
     [[nodiscard]] static ByteSource fromBytes(Bytes bytes);
     [[nodiscard]] static ByteSource fromShared(std::shared_ptr<const Bytes> bytes);
-    /// The caller keeps `bytes` alive longer than every copy (fuzzers, tests).
-    [[nodiscard]] static ByteSource fromView(ByteSpan bytes);
 
     [[nodiscard]] std::uint64_t size() const;
     /// Fills `out` from `offset`. Errors (invalidInput) when it reaches past the end, and when the

@@ -146,12 +146,6 @@ Result<Head> headOf(const ViewTable& table, const std::vector<std::string>& name
 
 }  // namespace
 
-Result<void> exportImages(const Bundle& bundle, const path& folder, const ExportOptions& options,
-                          Job& job) {
-    STX_CHECK(bundle.check());
-    return exportViews(*viewsOf(bundle), folder, options, job);
-}
-
 Result<void> exportViews(const ViewTable& table, const path& folder, const ExportOptions& options,
                          Job& job) {
     // Units and ranges follow from all planes.

@@ -30,23 +30,19 @@ struct ExportOptions {
     bool noClobber = false;
 };
 
-/// Writes a bundle as an image set: a folder that appears whole or not at all. Cameras are exact;
+/// Writes views as an image set: a folder that appears whole or not at all. They are written when
+/// they are read, which takes the memory of one for each thread. Cameras are exact;
 /// 8-bit colour is PNG with its coverage, linear colour OpenEXR or PNG. Normals and splats are
 /// dropped with a note. Cameras are in the world's coordinates, the bundle's origin added (it is
 /// kept as stx:origin). The environment is environment.exr, named as stx:environment (not for
 /// COLMAP). readImageSet() gives the same bundle again. Errors: io; invalidInput for what the kind
 /// cannot say; (usage) Depth::npy of another kind than transforms.
-[[nodiscard]] Result<void> exportImages(const Bundle& bundle, const std::filesystem::path& folder,
-                                        const ExportOptions& options, Job& job);
-
-/// The same of views that are written when they are read, which takes the memory of one for each
-/// thread.
 [[nodiscard]] Result<void> exportViews(const ViewTable& table, const std::filesystem::path& folder,
                                        const ExportOptions& options, Job& job);
 
 /// The same of a sequence: transforms.json with `time` and `camera`, a picture and a depth for each
 /// frame of a view; frames that repeat the one before name its files. openImageSet() gives the same
-/// sequence again. A sequence of one frame is exported as its views. Errors: as exportImages();
+/// sequence again. A sequence of one frame is exported as its views. Errors: as exportViews();
 /// (usage) another kind, which has one moment only.
 [[nodiscard]] Result<void> exportFrames(Sequence& frames, const std::filesystem::path& folder,
                                         const ExportOptions& options, Job& job);

@@ -455,6 +455,61 @@ Distances normalisedDisparity(double nearest, double farthest, bool zeroIsNone) 
     };
 }
 
+namespace {
+
+/// Where depth has another size than its picture, the picture becomes as small as the depth, unless
+/// the depth is to be raised to the picture's size.
+Result<void> matchSizes(const SetView& set, bool raise, StoredView& stored, Camera& camera,
+                        Job& job) {
+    const int tw = stored.texture.width(), th = stored.texture.height();
+    const int dw = stored.depth.width(), dh = stored.depth.height();
+    if (tw == dw && th == dh) return {};
+    if (!set.stretched && !sameShape(tw, th, dw, dh))
+        return fail(ErrorCode::invalidInput,
+                    "'{}' is {}x{} but its depth '{}' is {}x{}; both must match, or have the "
+                    "same shape",
+                    set.texture.name, tw, th, set.depth.name, dw, dh);
+    if (raise) {
+        job.note(fmt::format(
+            "depth of {}x{} is raised to the size of its picture, {}x{}, along the picture's "
+            "edges{}",
+            dw, dh, tw, th, stored.matte.count() > 0 ? " and its portrait matte" : ""));
+        return {};
+    }
+    job.note(fmt::format("images of {}x{} are resampled to the size of their depth, {}x{}", tw, th,
+                         dw, dh));
+    stored.texture = resizeTexture(stored.texture, dw, dh);
+    camera = camera.resized(dw, dh);
+    return {};
+}
+
+/// Resamples picture and depth as a pinhole sees them.
+Result<void> undoLens(const SetView& set, const Camera& camera, StoredView& stored, Job& job) {
+    if (!set.lens.invertible(camera))
+        return failAt(fmt::format("camera '{}'", set.name), ErrorCode::invalidInput,
+                      "the lens distortion folds the picture; k1 = {:g}, k2 = {:g}, k3 = {:g}, "
+                      "p1 = {:g}, p2 = {:g} cannot be undone",
+                      set.lens.k1, set.lens.k2, set.lens.k3, set.lens.p1, set.lens.p2);
+    const double shift = set.lens.largestShift(camera);
+    const char* what = !set.lens.distorts() ? "skew"
+                       : set.lens.skew != 0 ? "lens distortion and skew"
+                                            : "lens distortion";
+    const double cut = set.lens.cutShare(camera);
+    job.note(fmt::format(
+        "view '{}': {} of up to {:.2f} pixels undone by resampling{}", set.name, what, shift,
+        cut < kCutWorthTelling ? ""
+                               : fmt::format("; {:.0f} % of the picture lie outside a pinhole's of "
+                                             "the same focal length and size and are cut away",
+                                             100.0 * cut)));
+    auto [texture, depth] = undistort(stored.texture, stored.depth, camera, set.lens);
+    stored.texture = std::move(texture);
+    stored.depth = std::move(depth);
+    stored.alpha = true;  // what lies outside the real picture is transparent
+    return {};
+}
+
+}  // namespace
+
 Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSetOptions& options,
                                                RefineReport& report, Job& job) {
     STX_CHECK(job.checkCancelled());
@@ -467,24 +522,7 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
     const int dw = stored.depth.width(), dh = stored.depth.height();
     STX_TRY(Camera camera, cameraOfSize(set, tw, th));
     const bool raise = options.refine.atImport(RefineStep::raise, true) && dw < tw && dh < th;
-    if (tw != dw || th != dh) {
-        if (!set.stretched && !sameShape(tw, th, dw, dh))
-            return fail(ErrorCode::invalidInput,
-                        "'{}' is {}x{} but its depth '{}' is {}x{}; both must match, or have the "
-                        "same shape",
-                        set.texture.name, tw, th, set.depth.name, dw, dh);
-        if (raise) {
-            job.note(fmt::format(
-                "depth of {}x{} is raised to the size of its picture, {}x{}, along the picture's "
-                "edges{}",
-                dw, dh, tw, th, stored.matte.count() > 0 ? " and its portrait matte" : ""));
-        } else {
-            job.note(fmt::format("images of {}x{} are resampled to the size of their depth, {}x{}",
-                                 tw, th, dw, dh));
-            stored.texture = resizeTexture(stored.texture, dw, dh);
-            camera = camera.resized(dw, dh);
-        }
-    }
+    STX_CHECK(matchSizes(set, raise, stored, camera, job));
     if (!set.depthCamera) {
         Camera ofDepth = raise ? camera.resized(dw, dh) : camera;
         STX_CHECK(within(fmt::format("'{}'", set.depth.name),
@@ -513,29 +551,7 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
                           "no cube face of the panorama has a valid depth");
         return views;
     }
-    if (!set.lens.ideal()) {
-        if (!set.lens.invertible(camera))
-            return failAt(fmt::format("camera '{}'", set.name), ErrorCode::invalidInput,
-                          "the lens distortion folds the picture; k1 = {:g}, k2 = {:g}, k3 = {:g}, "
-                          "p1 = {:g}, p2 = {:g} cannot be undone",
-                          set.lens.k1, set.lens.k2, set.lens.k3, set.lens.p1, set.lens.p2);
-        const double shift = set.lens.largestShift(camera);
-        const char* what = !set.lens.distorts() ? "skew"
-                           : set.lens.skew != 0 ? "lens distortion and skew"
-                                                : "lens distortion";
-        const double cut = set.lens.cutShare(camera);
-        job.note(fmt::format("view '{}': {} of up to {:.2f} pixels undone by resampling{}",
-                             set.name, what, shift,
-                             cut < kCutWorthTelling
-                                 ? ""
-                                 : fmt::format("; {:.0f} % of the picture lie outside a pinhole's "
-                                               "of the same focal length and size and are cut away",
-                                               100.0 * cut)));
-        auto [texture, depth] = undistort(stored.texture, stored.depth, camera, set.lens);
-        stored.texture = std::move(texture);
-        stored.depth = std::move(depth);
-        stored.alpha = true;  // what lies outside the real picture is transparent
-    }
+    if (!set.lens.ideal()) STX_CHECK(undoLens(set, camera, stored, job));
     STX_TRY(auto view, finish(set, set.name, camera, std::move(stored.texture),
                               std::move(stored.depth), stored.alpha, noDepth, options, job));
     if (!anyPoint(view.depth))

@@ -121,6 +121,49 @@ Result<void> checkSide(double width, double height, std::string_view name, const
     return {};
 }
 
+/// The channel of that name; -1: there is none.
+int channelIn(const DecodedImage& image, std::string_view name) {
+    const auto it = std::ranges::find(image.channelNames, name);
+    return it == image.channelNames.end() ? -1 : static_cast<int>(it - image.channelNames.begin());
+}
+
+/// Channels by their names: R G B, or one grey for all three.
+Result<RgbaFloatImage> colourOfFloats(const DecodedImage& image, std::string_view name) {
+    int at[4] = {channelIn(image, "R"), channelIn(image, "G"), channelIn(image, "B"),
+                 channelIn(image, "A")};
+    if (at[0] < 0 && at[1] < 0 && at[2] < 0) {
+        const int grey = channelIn(image, "Y") >= 0 ? channelIn(image, "Y")
+                         : image.channels <= 2      ? 0
+                                                    : -1;
+        if (grey < 0)
+            return failAt(inQuotes(name), ErrorCode::invalidInput,
+                          "there are no channels R, G, B or Y in it");
+        at[0] = at[1] = at[2] = grey;
+    }
+    const auto& values = std::get<std::vector<float>>(image.values);
+    RgbaFloatImage pixels(image.width, image.height);
+    for (std::size_t i = 0; i < pixels.count(); ++i) {
+        glm::vec4 p(0, 0, 0, 1);
+        for (int k = 0; k < 4; ++k) {
+            if (at[k] < 0) continue;
+            const float v = values[i * static_cast<std::size_t>(image.channels) +
+                                   static_cast<std::size_t>(at[k])];
+            if (!std::isfinite(v))
+                return failAt(inQuotes(name), ErrorCode::invalidInput,
+                              "a colour at column {}, row {} is not finite",
+                              i % static_cast<std::size_t>(image.width),
+                              i / static_cast<std::size_t>(image.width));
+            p[k] = v;
+        }
+        if (at[3] >= 0) {
+            p.a = std::clamp(p.a, 0.0f, 1.0f);
+            if (image.premultiplied && p.a > 0) p = glm::vec4(glm::vec3(p) / p.a, p.a);
+        }
+        pixels.data()[i] = p;
+    }
+    return pixels;
+}
+
 }  // namespace
 
 Result<StoredColour> readColour(const PictureSource& source, const YuvColour& colour, bool deep,
@@ -151,12 +194,8 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         return out;
     }
     STX_TRY(auto image, decode(source, bytes, job));
-    const auto hasName = [&](std::string_view n) {
-        return std::find(image.channelNames.begin(), image.channelNames.end(), n) !=
-               image.channelNames.end();
-    };
-    out.alpha =
-        image.channelNames.empty() ? image.channels == 2 || image.channels == 4 : hasName("A");
+    out.alpha = image.channelNames.empty() ? image.channels == 2 || image.channels == 4
+                                           : channelIn(image, "A") >= 0;
     if (image.bits() == 16 && deep) {
         out.texture = linearFromCoded(image);
         return out;
@@ -167,41 +206,7 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         out.texture = rgba8From(image);
         return out;
     }
-    // Channels by their names: R G B, or one grey for all three.
-    const auto channel = [&](std::string_view n) {
-        const auto it = std::find(image.channelNames.begin(), image.channelNames.end(), n);
-        return it == image.channelNames.end() ? -1
-                                              : static_cast<int>(it - image.channelNames.begin());
-    };
-    int at[4] = {channel("R"), channel("G"), channel("B"), channel("A")};
-    if (at[0] < 0 && at[1] < 0 && at[2] < 0) {
-        const int grey = channel("Y") >= 0 ? channel("Y") : image.channels <= 2 ? 0 : -1;
-        if (grey < 0)
-            return failAt(inQuotes(source.name), ErrorCode::invalidInput,
-                          "there are no channels R, G, B or Y in it");
-        at[0] = at[1] = at[2] = grey;
-    }
-    const auto& values = std::get<std::vector<float>>(image.values);
-    RgbaFloatImage pixels(image.width, image.height);
-    for (std::size_t i = 0; i < pixels.count(); ++i) {
-        glm::vec4 p(0, 0, 0, 1);
-        for (int k = 0; k < 4; ++k) {
-            if (at[k] < 0) continue;
-            const float v = values[i * static_cast<std::size_t>(image.channels) +
-                                   static_cast<std::size_t>(at[k])];
-            if (!std::isfinite(v))
-                return failAt(inQuotes(source.name), ErrorCode::invalidInput,
-                              "a colour at column {}, row {} is not finite",
-                              i % static_cast<std::size_t>(image.width),
-                              i / static_cast<std::size_t>(image.width));
-            p[k] = v;
-        }
-        if (at[3] >= 0) {
-            p.a = std::clamp(p.a, 0.0f, 1.0f);
-            if (image.premultiplied && p.a > 0) p = glm::vec4(glm::vec3(p) / p.a, p.a);
-        }
-        pixels.data()[i] = p;
-    }
+    STX_TRY(auto pixels, colourOfFloats(image, source.name));
     out.texture = std::move(pixels);
     return out;
 }

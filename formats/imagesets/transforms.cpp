@@ -42,6 +42,24 @@ bool hasOwnIntrinsics(const Json& frame) {
     return false;
 }
 
+Result<void> setLens(const Json& file, const Json& frame, const std::string& where, bool fisheye,
+                     Lens& lens) {
+    const std::pair<const char*, double*> terms[] = {
+        {"k1", &lens.k1}, {"k2", &lens.k2}, {"k3", &lens.k3}, {"p1", &lens.p1}, {"p2", &lens.p2}};
+    for (const auto& [key, to] : terms) {
+        STX_TRY(const auto value, find(file, frame, key, where));
+        *to = value.value_or(0);
+    }
+    STX_TRY(const auto k4, find(file, frame, "k4", where));
+    lens.fisheye = fisheye;
+    if (fisheye)
+        lens.k4 = k4.value_or(0);
+    else if (k4.value_or(0) != 0)
+        return failAt(where, ErrorCode::invalidInput,
+                      "'k4' is {:g}; only k1 k2 k3 p1 p2 can be undone", *k4);
+    return {};
+}
+
 Result<void> setIntrinsics(const Json& file, const Json& frame, const std::string& where,
                            SetView& view) {
     const auto get = [&](const char* key) { return find(file, frame, key, where); };
@@ -75,22 +93,7 @@ Result<void> setIntrinsics(const Json& file, const Json& frame, const std::strin
     STX_TRY(const auto cy, get("cy"));
     STX_TRY(const auto angleX, get("camera_angle_x"));
     STX_TRY(const auto angleY, get("camera_angle_y"));
-    const std::pair<const char*, double*> lens[] = {{"k1", &view.lens.k1},
-                                                    {"k2", &view.lens.k2},
-                                                    {"k3", &view.lens.k3},
-                                                    {"p1", &view.lens.p1},
-                                                    {"p2", &view.lens.p2}};
-    for (const auto& [key, to] : lens) {
-        STX_TRY(const auto value, get(key));
-        *to = value.value_or(0);
-    }
-    STX_TRY(const auto k4, get("k4"));
-    view.lens.fisheye = model == "OPENCV_FISHEYE";
-    if (view.lens.fisheye)
-        view.lens.k4 = k4.value_or(0);
-    else if (k4.value_or(0) != 0)
-        return failAt(where, ErrorCode::invalidInput,
-                      "'k4' is {:g}; only k1 k2 k3 p1 p2 can be undone", *k4);
+    STX_CHECK(setLens(file, frame, where, model == "OPENCV_FISHEYE", view.lens));
     for (const auto& [angle, key] :
          {std::pair{angleX, "camera_angle_x"}, std::pair{angleY, "camera_angle_y"}})
         if (angle && !(*angle > 0 && *angle < 3.14159))

@@ -227,12 +227,6 @@ Result<std::unique_ptr<ViewTable>> openMpeg4Views(const std::filesystem::path& p
     return table;
 }
 
-Result<void> writeMpeg4Bundle(const Bundle& bundle, const std::filesystem::path& path, Job& job,
-                              const SceneWriteOptions& scene, const Mpeg4WriteOptions& options) {
-    STX_TRY(const auto document, sceneFromBundle(bundle, scene, job));
-    return writeMpeg4(document, path, job, options);
-}
-
 Result<void> writeMpeg4Views(const ViewTable& table, const std::filesystem::path& path, Job& job,
                              const SceneWriteOptions& scene, const Mpeg4WriteOptions& options) {
     std::optional<PictureSpool> spool;

@@ -45,11 +45,7 @@ struct Mpeg4WriteOptions {
 /// The same as a table, see mpeg4::viewsFromScene().
 [[nodiscard]] Result<std::unique_ptr<ViewTable>> openMpeg4Views(const std::filesystem::path& path,
                                                                 Job& job);
-[[nodiscard]] Result<void> writeMpeg4Bundle(const Bundle& bundle, const std::filesystem::path& path,
-                                            Job& job, const mpeg4::SceneWriteOptions& scene = {},
-                                            const Mpeg4WriteOptions& options = {});
-
-/// The same bytes of views that are encoded when they come, by way of a file beside the target. See
+/// Views are encoded when they come, by way of a file beside the target. See
 /// mpeg4::sceneFromViews().
 [[nodiscard]] Result<void> writeMpeg4Views(const ViewTable& table,
                                            const std::filesystem::path& path, Job& job,

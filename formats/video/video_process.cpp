@@ -24,10 +24,4 @@ Result<Bytes> VideoProcess::ask(video::Tag request, ByteSpan bytes, video::Tag e
                 "than --max-memory allows");
 }
 
-VideoModule videoModule() {
-    const auto process = VideoProcess::start(Limits());
-    if (!process) return {false, {}, process.error().message};
-    return {true, (*process)->libraries(), {}};
-}
-
 }  // namespace stx

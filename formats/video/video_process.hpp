@@ -32,13 +32,4 @@ class VideoProcess {
     std::uint64_t most_ = 0;  ///< bytes of an answer
 };
 
-/// Whether compressed video can be read and written here.
-struct VideoModule {
-    bool present = false;
-    std::string libraries;
-    std::string reason;  ///< why it is not present
-};
-/// Starts a process to find out.
-[[nodiscard]] VideoModule videoModule();
-
 }  // namespace stx

@@ -94,11 +94,6 @@ Tile withRectangles(Tile tile, const Atlas& atlas, int page) {
 
 }  // namespace
 
-Result<Sheet> sheetOf(const Bundle& bundle, const SheetSettings& settings, Job& job) {
-    STX_CHECK(bundle.check());
-    return sheetOf(*viewsOf(bundle), settings, job);
-}
-
 Result<Sheet> sheetOf(const ViewTable& table, const SheetSettings& settings, Job& job) {
     const Bundle& bundle = table.about();
     const auto some = [&](auto of) { return std::ranges::any_of(table.kinds(), of); };

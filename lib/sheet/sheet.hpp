@@ -31,9 +31,8 @@ struct Sheet {
 };
 
 /// Every view with its name and camera: colour, depth, and normals and splats where there are some.
-/// Errors: a bundle that fails check(), a sheet that is too small (planSheet()), memory, cancelled.
-[[nodiscard]] Result<Sheet> sheetOf(const Bundle& bundle, const SheetSettings& settings, Job& job);
-/// The same of views that are shrunk when they are read.
+/// Views are shrunk when they are read.
+/// Errors: those of the views, a sheet that is too small (planSheet()), memory, cancelled.
 [[nodiscard]] Result<Sheet> sheetOf(const ViewTable& table, const SheetSettings& settings,
                                     Job& job);
 

@@ -226,23 +226,7 @@ Result<SplatCloud> cloudOf(std::vector<Image<Disc>> images, glm::dvec3 origin,
     return std::move(maker.cloud);
 }
 
-const PeakMemory& memoryOfSplats(const SplatSettings& settings) {
-    return settings.most > 0 ? peak::kFewerSplats : peak::kSplats;
-}
-
 }  // namespace
-
-Result<SplatCloud> splatsOfBundle(Bundle bundle, const SplatSettings& settings, Job& job) {
-    STX_CHECK(checkPeak(memoryOfSplats(settings), bundle.views, job.limits));
-    STX_CHECK(bundle.check());
-    const glm::dvec3 origin = bundle.origin;
-    const auto table = tableOf(std::move(bundle));
-    STX_TRY(const auto ordered,
-            withAxes(someViewsOf(*table, orderOf(std::as_const(*table).about()))));
-    STX_TRY(auto images, finestDiscs(*ordered, settings, nullptr, job));
-    table->about().views.clear();
-    return cloudOf(std::move(images), origin, settings, nullptr, job);
-}
 
 Result<SplatCloud> splatsOfViews(const ViewTable& table, const SplatSettings& settings,
                                  PixelSpool* spool, Job& job) {

@@ -21,19 +21,18 @@ struct SplatSettings {
     std::size_t most = 0;
 };
 
-/// A Gaussian for each place of a bundle, of the view that shows it finest: below its point (see
-/// SplatSettings::pixelsPerTexel), flat in its surface, along the axes of its ellipse (those of
-/// bake() where a view has none), with its colour and 0.99 of its alpha. Splats of background views
-/// come first. The coordinates are the world's: an origin is added, with a note where floats round
-/// it.
+/// A Gaussian for each place that views show, of the view that shows it finest: below its point
+/// (see SplatSettings::pixelsPerTexel), flat in its surface, along the axes of its ellipse (those
+/// of bake() where a view has none), with its colour and 0.99 of its alpha. Splats of background
+/// views come first. The coordinates are the world's: an origin is added, with a note where floats
+/// round it.
 ///
-/// Errors: those of bake(); (invalidInput) no point, more than 2^32 - 1; (failed) flat pieces do
-/// not come down to `most`, with the least that they come to; memory over the limit, cancelled.
-[[nodiscard]] Result<SplatCloud> splatsOfBundle(Bundle bundle, const SplatSettings& settings,
-                                                Job& job);
-/// The same of views that are read one by one. What is known of each pixel is in a spool, if any:
-/// then memory is taken for one view for each thread, and for the cloud.
-/// Errors: also those of the views.
+/// Views are read one by one. What is known of each pixel is in a spool, if any: then memory is
+/// taken for one view for each thread, and for the cloud.
+///
+/// Errors: those of bake() and of the views; (invalidInput) no point, more than 2^32 - 1; (failed)
+/// flat pieces do not come down to `most`, with the least that they come to; memory over the limit,
+/// cancelled.
 [[nodiscard]] Result<SplatCloud> splatsOfViews(const ViewTable& table,
                                                const SplatSettings& settings, PixelSpool* spool,
                                                Job& job);

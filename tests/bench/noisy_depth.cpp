@@ -20,7 +20,7 @@ int main(int argc, char** argv) {
                         "'{}' is not noise or mixed and a percentage, codes8, missing3, edges1 or "
                         "light",
                         argv[3]);
-        return writeExrBundle(bundle, argv[2], job);
+        return writeExrViews(*viewsOf(bundle), argv[2], job);
     };
     if (argc != 4) {
         std::fprintf(stderr, "usage: noisy_depth BUNDLE OUT.exr KIND\n");

@@ -5,6 +5,7 @@
 
 #include "formats/mpeg4/bifs/bifs.hpp"
 #include "tests/fuzz/violated.hpp"
+#include "tests/same_scenes.hpp"
 
 using namespace stx;
 using namespace stx::mpeg4;

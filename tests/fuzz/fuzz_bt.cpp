@@ -9,6 +9,7 @@
 #include "formats/mpeg4/text/bt.hpp"
 #include "tests/fuzz/scene_in_time.hpp"
 #include "tests/fuzz/text_round_trip.hpp"
+#include "tests/same_scenes.hpp"
 
 using namespace stx;
 using namespace stx::mpeg4;

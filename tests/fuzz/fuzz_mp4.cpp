@@ -3,6 +3,7 @@
 #include "formats/mpeg4/container/isobmff.hpp"
 #include "tests/fuzz/scene_in_time.hpp"
 #include "tests/fuzz/violated.hpp"
+#include "tests/same_scenes.hpp"
 
 using namespace stx;
 using namespace stx::mpeg4;
@@ -24,7 +25,8 @@ bool isQuantised(const Document& document) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     Job job;
     job.limits.maxMemoryBytes = 64u << 20;
-    const auto source = ByteSource::fromView({reinterpret_cast<const std::byte*>(data), size});
+    const auto* bytesGiven = reinterpret_cast<const std::byte*>(data);
+    const auto source = ByteSource::fromBytes(Bytes(bytesGiven, bytesGiven + size));
     const auto document = readMp4(source, job);
     if (!document) {
         if (document.error().message.empty()) violated("an error has a message");
@@ -39,7 +41,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
     const auto bytes = writeMp4(*document, job);
     if (!bytes) return 0;
-    const auto again = readMp4(ByteSource::fromView(*bytes), job);
+    const auto again = readMp4(ByteSource::fromBytes(*bytes), job);
     if (!again) violated("what is written can be read", again.error().text());
     if (!isQuantised(*document) && !sameFrames(document->frames, again->frames))
         violated("what is written reads the same");

@@ -10,7 +10,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     Job job;
     job.limits.maxMemoryBytes = 8u << 20;
     const ByteSpan bytes(reinterpret_cast<const std::byte*>(data), size);
-    const auto reader = Y4mReader::open(ByteSource::fromView(bytes), job);
+    const auto reader =
+        Y4mReader::open(ByteSource::fromBytes(Bytes(bytes.begin(), bytes.end())), job);
     if (!reader) {
         if (reader.error().message.empty()) std::abort();
         return 0;

@@ -110,13 +110,8 @@ std::string formatByEnding(std::string_view ending) {
     throw Failed{ErrorCode::invalidInput, reason.empty() ? otherwise : reason};
 }
 
-/// `fileName`: what the file can be opened by, for formats that the library reads by name only.
-void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
-                   const std::string& fileName, PictureAnswer& answer) {
-    const std::string_view head(reinterpret_cast<const char*>(file.data()),
-                                std::min<std::size_t>(file.size(), 16));
-    if (formatByContent(head) == std::string_view("webp") && decodeWebp(file, answer)) return;
-    setUpOnce();
+/// The library's name of what the file is, by its first bytes or else by the ending of its name.
+std::string formatOf(std::string_view head, std::string_view name) {
     std::string format = formatByContent(head);
     if (format.empty()) {
         const auto dot = name.rfind('.');
@@ -126,6 +121,42 @@ void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
         throw Failed{ErrorCode::invalidInput,
                      "it is not an image of a known kind (PNG, JPEG, TIFF, BMP, "
                      "TGA, HDR, WebP, GIF, PSD, PNM, DDS, JPEG 2000, SGI)"};
+    return format;
+}
+
+/// How the values are given: 8 or 16 bits where all channels have them, else floats.
+OIIO::TypeDesc typeOfValues(const OIIO::ImageSpec& spec) {
+    const auto same = [&](const OIIO::TypeDesc& channel) { return channel == spec.format; };
+    const bool integers =
+        spec.format == OIIO::TypeDesc::UINT8 || spec.format == OIIO::TypeDesc::UINT16;
+    return integers && std::ranges::all_of(spec.channelformats, same) ? spec.format
+                                                                      : OIIO::TypeDesc::FLOAT;
+}
+
+decoders::PictureFacts factsOf(const OIIO::ImageSpec& spec, const std::string& format, int bits) {
+    decoders::PictureFacts facts;
+    facts.bits = bits;
+    facts.width = spec.width;
+    facts.height = spec.height;
+    facts.channels = spec.nchannels;
+    facts.originX = spec.x - spec.full_x;
+    facts.originY = spec.y - spec.full_y;
+    facts.displayWidth = spec.full_width;
+    facts.displayHeight = spec.full_height;
+    facts.linear = bits == 32;
+    facts.premultiplied = spec.alpha_channel >= 0 && format != "bmp" &&
+                          spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
+    return facts;
+}
+
+/// `fileName`: what the file can be opened by, for formats that the library reads by name only.
+void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
+                   const std::string& fileName, PictureAnswer& answer) {
+    const std::string_view head(reinterpret_cast<const char*>(file.data()),
+                                std::min<std::size_t>(file.size(), 16));
+    if (formatByContent(head) == std::string_view("webp") && decodeWebp(file, answer)) return;
+    setUpOnce();
+    const std::string format = formatOf(head, name);
 
     OIIO::ImageSpec config;
     // Alpha and colour as the file stores them: no multiplying, no dividing.
@@ -154,31 +185,8 @@ void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
     std::vector<std::string> names = spec.channelnames;
     names.resize(static_cast<std::size_t>(std::max(spec.nchannels, 0)));
 
-    OIIO::TypeDesc type = OIIO::TypeDesc::FLOAT;
-    decoders::PictureFacts header;
-    header.bits = 32;
-    if (spec.format == OIIO::TypeDesc::UINT8) {
-        type = OIIO::TypeDesc::UINT8;
-        header.bits = 8;
-    } else if (spec.format == OIIO::TypeDesc::UINT16) {
-        type = OIIO::TypeDesc::UINT16;
-        header.bits = 16;
-    }
-    for (const auto& channel : spec.channelformats) {
-        if (channel == spec.format) continue;
-        type = OIIO::TypeDesc::FLOAT;
-        header.bits = 32;
-    }
-    header.width = spec.width;
-    header.height = spec.height;
-    header.channels = spec.nchannels;
-    header.originX = spec.x - spec.full_x;
-    header.originY = spec.y - spec.full_y;
-    header.displayWidth = spec.full_width;
-    header.displayHeight = spec.full_height;
-    header.linear = header.bits == 32;
-    header.premultiplied = spec.alpha_channel >= 0 && format != "bmp" &&
-                           spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
+    const OIIO::TypeDesc type = typeOfValues(spec);
+    decoders::PictureFacts header = factsOf(spec, format, static_cast<int>(8 * type.size()));
     const BmpPixel pixel =
         format == "bmp" && spec.nchannels == 4 && header.bits == 8 ? bmpPixelOf(file) : BmpPixel{};
     if (pixel.channels != 0) header.channels = pixel.channels;

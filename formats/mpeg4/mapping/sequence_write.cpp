@@ -389,7 +389,11 @@ class SequenceWriter {
         track.camera = view.camera;
         NodePtr node = std::make_shared<Node>(*track.node);
         setCamera(*node, images.padding.camera);
-        if (sameNode(node, track.node)) return {};
+        // Only values of the camera were set; nodes below are shared.
+        const auto same = [](const Node::SetField& a, const Node::SetField& b) {
+            return a.index == b.index && sameValue(a.value, b.value);
+        };
+        if (std::ranges::equal(node->setFields, track.node->setFields, same)) return {};
         if (document_.frames.back().time != now || document_.frames.size() == 1) {
             CommandFrame frame;
             frame.time = now;

@@ -340,16 +340,6 @@ void forEachNode(const NodePtr& root, const std::function<void(const NodePtr&)>&
 /// The same for every node in a command: targets, values, both ends of routes.
 void forEachNode(const Command& command, const std::function<void(const NodePtr&)>& visit);
 
-/// What else than types, sharing and values counts in a comparison.
-struct SameOptions {
-    bool ids = true;    ///< DEF ids of nodes and routes
-    bool names = true;  ///< DEF names of nodes and routes
-};
-/// Whether two graphs are the same. Values are compared bit for bit; a field set to its default is
-/// the same as one not set.
-[[nodiscard]] bool sameNode(const NodePtr& a, const NodePtr& b, SameOptions options = {});
-[[nodiscard]] bool sameFrames(const std::vector<CommandFrame>& a,
-                              const std::vector<CommandFrame>& b, SameOptions options = {});
 /// Compares everything but node-valued fields bit for bit.
 [[nodiscard]] bool sameValue(const FieldValue& a, const FieldValue& b);
 

@@ -55,13 +55,6 @@ std::optional<T> realFromText(std::string_view text) {
 
 }  // namespace
 
-std::string textFromFloat(float value) {
-    return fmt::format("{}", value);
-}
-std::string textFromDouble(double value) {
-    return fmt::format("{}", value);
-}
-
 std::optional<float> floatFromText(std::string_view text) {
     return realFromText<float>(text);
 }

@@ -9,10 +9,6 @@ namespace stx::mpeg4 {
 
 /// The spelling of values that BT and XMT-A share. All of it is independent of the locale.
 
-/// The shortest decimal that reads back to the same float; `nan`, `inf` and `-inf` for the rest.
-[[nodiscard]] std::string textFromFloat(float value);
-[[nodiscard]] std::string textFromDouble(double value);
-
 /// Reads all of `text` as a number: an optional sign, decimal digits with an optional point and
 /// exponent (`1`, `+1`, `-.5`, `1.`, `6e-3`), hexadecimal integers (`0xFF`), `nan`, `inf`. Nothing
 /// when it is something else or too large for the type; what is too small becomes zero.

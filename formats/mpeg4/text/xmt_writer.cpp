@@ -132,7 +132,7 @@ class XmtWriter {
         out_ += "/>\n";
     }
     void beginTime(double seconds, bool rap) {
-        Attributes attributes = {{"begin", textFromDouble(seconds)}};
+        Attributes attributes = {{"begin", fmt::format("{}", seconds)}};
         if (rap) attributes.push_back({"isRAP", "yes"});
         if (seconds != 0 || rap) open("par", attributes);
     }
@@ -458,7 +458,7 @@ class XmtWriter {
             add(mux, "startTime", times.startMs, 0.0);
             add(mux, "frameRate", times.frameRate, 0.0);
             if (times.frameRate != 0 || times.durationMs != 1000)
-                mux.push_back({"duration", textFromDouble(times.durationMs)});
+                mux.push_back({"duration", fmt::format("{}", times.durationMs)});
             empty("StreamSource", mux);
         }
         close("ES_Descriptor");

@@ -145,6 +145,70 @@ struct EglContext::Impl {
 
 namespace {
 
+/// The newest context of what we know how to use, which says when its device was reset where that
+/// is possible (`egl15`). EGL_NO_CONTEXT: there is none.
+EGLContext createContext(EGLDisplay display, EGLConfig config, EglContext::Profile profile,
+                         bool egl15) {
+    constexpr std::array<std::array<EGLint, 2>, 2> kVersions{{{4, 5}, {3, 3}}};
+    for (const auto& version : kVersions) {
+        if (faults().onlyOld && version[0] > 3) continue;
+        for (const bool robust : {true, false}) {
+            if (robust && !egl15) continue;
+            std::vector<EGLint> attributes = {EGL_CONTEXT_MAJOR_VERSION,
+                                              version[0],
+                                              EGL_CONTEXT_MINOR_VERSION,
+                                              version[1],
+                                              EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                              profile == EglContext::Profile::core
+                                                  ? EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT
+                                                  : EGL_CONTEXT_OPENGL_COMPATIBILITY_PROFILE_BIT};
+            if (robust) {
+                attributes.push_back(EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY);
+                attributes.push_back(EGL_LOSE_CONTEXT_ON_RESET);
+            }
+            attributes.push_back(EGL_NONE);
+            EGLContext made = eglCreateContext(display, config, EGL_NO_CONTEXT, attributes.data());
+            if (made != EGL_NO_CONTEXT) return made;
+        }
+    }
+    return EGL_NO_CONTEXT;
+}
+
+/// Asks the current context what its device is and can do.
+void askDevice(Device& device, ContextAbilities& abilities) {
+    const auto text = [](GLenum name) {
+        const auto* s = reinterpret_cast<const char*>(glGetString(name));
+        return std::string(s ? s : "");
+    };
+    device.name = text(GL_RENDERER);
+    device.version = text(GL_VERSION);
+    device.software = isSoftware(device.name);
+    abilities.modern = epoxy_gl_version() >= 45 && !faults().onlyOld;
+    GLint value = 0;
+    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &value);
+    if (faults().maxTextureSize > 0) value = std::min(value, faults().maxTextureSize);
+    device.maxTextureSize = abilities.maxTextureSize = value;
+    glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &value);
+    abilities.maxTextureLayers = value;
+    GLint64 bytes = 0;
+    if (abilities.modern) glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
+    abilities.maxStorageBytes = bytes;
+    abilities.atomicInt64 =
+        faults().atomicInt64.value_or(epoxy_has_gl_extension("GL_NV_shader_atomic_int64") &&
+                                      epoxy_has_gl_extension("GL_ARB_gpu_shader_int64"));
+    abilities.atomicFloat =
+        faults().atomicFloat.value_or(epoxy_has_gl_extension("GL_NV_shader_atomic_float"));
+    // Mesa's softpipe counts gl_VertexID from 0 again after each 4096 vertices.
+    if (device.name == "softpipe") abilities.verticesAtOnce = 4096;
+    if (abilities.modern) {
+        GLint strategy = 0;
+        glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY, &strategy);
+        abilities.resetStatus = strategy == GL_LOSE_CONTEXT_ON_RESET;
+    }
+    while (glGetError() != GL_NO_ERROR) {
+    }
+}
+
 /// Opens a context on a display and asks what it is. The error is a clause for the list of
 /// attempts.
 tl::expected<std::unique_ptr<EglContext::Impl>, std::string> open(const Candidate& candidate,
@@ -168,68 +232,15 @@ tl::expected<std::unique_ptr<EglContext::Impl>, std::string> open(const Candidat
         if (!eglChooseConfig(candidate.display, wanted, &config, 1, &count) || count < 1)
             return tl::unexpected(candidate.label + ": no configuration for OpenGL");
     }
-    // The newest of what we know how to use, and a context that says when its device was reset.
-    const bool egl15 = major > 1 || minor >= 5;
-    constexpr std::array<std::array<EGLint, 2>, 2> kVersions{{{4, 5}, {3, 3}}};
-    for (const auto& version : kVersions) {
-        if (faults().onlyOld && version[0] > 3) continue;
-        for (const bool robust : {true, false}) {
-            if (impl->context != EGL_NO_CONTEXT || (robust && !egl15)) continue;
-            std::vector<EGLint> attributes = {EGL_CONTEXT_MAJOR_VERSION,
-                                              version[0],
-                                              EGL_CONTEXT_MINOR_VERSION,
-                                              version[1],
-                                              EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                              profile == EglContext::Profile::core
-                                                  ? EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT
-                                                  : EGL_CONTEXT_OPENGL_COMPATIBILITY_PROFILE_BIT};
-            if (robust) {
-                attributes.push_back(EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY);
-                attributes.push_back(EGL_LOSE_CONTEXT_ON_RESET);
-            }
-            attributes.push_back(EGL_NONE);
-            impl->context =
-                eglCreateContext(candidate.display, config, EGL_NO_CONTEXT, attributes.data());
-        }
-    }
+    impl->context = createContext(candidate.display, config, profile, major > 1 || minor >= 5);
     if (impl->context == EGL_NO_CONTEXT)
         return tl::unexpected(candidate.label + ": no OpenGL 3.3 context (" +
                               eglErrorText(eglGetError()) + ")");
     if (!eglMakeCurrent(candidate.display, EGL_NO_SURFACE, EGL_NO_SURFACE, impl->context))
         return tl::unexpected(candidate.label + ": " + eglErrorText(eglGetError()));
 
-    const auto text = [](GLenum name) {
-        const auto* s = reinterpret_cast<const char*>(glGetString(name));
-        return std::string(s ? s : "");
-    };
-    impl->device.name = text(GL_RENDERER);
-    impl->device.version = text(GL_VERSION);
     impl->device.platform = candidate.platform;
-    impl->device.software = isSoftware(impl->device.name);
-    impl->abilities.modern = epoxy_gl_version() >= 45 && !faults().onlyOld;
-    GLint value = 0;
-    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &value);
-    if (faults().maxTextureSize > 0) value = std::min(value, faults().maxTextureSize);
-    impl->device.maxTextureSize = impl->abilities.maxTextureSize = value;
-    glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &value);
-    impl->abilities.maxTextureLayers = value;
-    GLint64 bytes = 0;
-    if (impl->abilities.modern) glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
-    impl->abilities.maxStorageBytes = bytes;
-    impl->abilities.atomicInt64 =
-        faults().atomicInt64.value_or(epoxy_has_gl_extension("GL_NV_shader_atomic_int64") &&
-                                      epoxy_has_gl_extension("GL_ARB_gpu_shader_int64"));
-    impl->abilities.atomicFloat =
-        faults().atomicFloat.value_or(epoxy_has_gl_extension("GL_NV_shader_atomic_float"));
-    // Mesa's softpipe counts gl_VertexID from 0 again after each 4096 vertices.
-    if (impl->device.name == "softpipe") impl->abilities.verticesAtOnce = 4096;
-    if (impl->abilities.modern) {
-        GLint strategy = 0;
-        glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY, &strategy);
-        impl->abilities.resetStatus = strategy == GL_LOSE_CONTEXT_ON_RESET;
-    }
-    while (glGetError() != GL_NO_ERROR) {
-    }
+    askDevice(impl->device, impl->abilities);
     eglMakeCurrent(candidate.display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     return impl;
 }

@@ -198,14 +198,6 @@ bool PageSet::exactDepth() const {
     });
 }
 
-std::uint64_t PageSet::pixelCount() const {
-    std::uint64_t n = 0;
-    for (const PageView& v : views())
-        n += static_cast<std::uint64_t>(v.camera.width) *
-             static_cast<std::uint64_t>(v.camera.height);
-    return n;
-}
-
 std::int64_t PageSet::pointCount() const {
     std::int64_t n = 0;
     for (const PageRectangle& r : rectangles()) {

@@ -107,8 +107,6 @@ class PageSet {
     [[nodiscard]] bool linear() const;
     [[nodiscard]] bool pruned() const { return data_->pruned; }
     [[nodiscard]] std::int64_t pointCount() const;
-    /// The pixels of all views together.
-    [[nodiscard]] std::uint64_t pixelCount() const;
     /// The same with translucent surfaces made opaque, for renderers to whom alpha says how much of
     /// a pixel the object covers at its outline: points with translucent points all around them,
     /// and those beside such, get full alpha. `changed` tells whether there were any.

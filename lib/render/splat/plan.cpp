@@ -66,6 +66,115 @@ Cell cellAt(const RectangleImages& s, double u, double v, double z, double slope
     return c;
 }
 
+// Where the corners of a block are in the picture, and how far. All in front of the camera, they
+// bound the block.
+struct Corners {
+    double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300;
+    double zMin = 1e300, zMax = -1e300;
+};
+
+Corners cornersOf(const BlockInfo& block, const PixelMap& m, bool orthographic) {
+    Corners all;
+    for (int corner = 0; corner < 4; ++corner) {
+        const double u = (corner & 1) ? block.u1 - 1 : block.u0,
+                     v = (corner & 2) ? block.v1 - 1 : block.v0;
+        const glm::dvec3 a = m.a0 + m.au * u + m.av * v, b = m.b0 + m.bu * u + m.bv * v;
+        for (const float z : {block.zMin, block.zMax}) {
+            const glm::dvec3 h = a * double(z) + b;
+            all.zMin = std::min(all.zMin, h.z);
+            all.zMax = std::max(all.zMax, h.z);
+            const double w = orthographic ? 1.0 : 1.0 / h.z;
+            all.x0 = std::min(all.x0, h.x * w);
+            all.x1 = std::max(all.x1, h.x * w);
+            all.y0 = std::min(all.y0, h.y * w);
+            all.y1 = std::max(all.y1, h.y * w);
+        }
+    }
+    return all;
+}
+
+// The cells of a block: its middle one where the surface is smooth, else the corners of what
+// occurs.
+struct Cells {
+    Cell middle;
+    bool smooth = false;
+    double cover2 = 0, det = -1e300, stretch2 = 0;  // the largest
+};
+
+Cells cellsOf(const BlockInfo& block, const RectangleImages& s, glm::dvec2 centre, bool crossing,
+              bool orthographic) {
+    const float unit = 1.0f / kSlopeScale;
+    const float su0 = block.slopeMin.u * unit, su1 = block.slopeMax.u * unit;
+    const float sv0 = block.slopeMin.v * unit, sv1 = block.slopeMax.v * unit;
+    const auto at = [&](double z, double su, double sv) {
+        return cellAt(s, centre.x, centre.y, z, su, sv, orthographic);
+    };
+    Cells all;
+    all.smooth = su1 - su0 < kSmoothSlopes && sv1 - sv0 < kSmoothSlopes &&
+                 block.zMax < kSmoothDepths * block.zMin;
+    all.middle = at(0.5 * (block.zMin + block.zMax), 0.5 * (su0 + su1), 0.5 * (sv0 + sv1));
+    if (crossing) {
+        all.cover2 = 1e300;
+        all.det = 1;
+        all.stretch2 = 1;
+        return all;
+    }
+    const auto consider = [&](const Cell& c) {
+        all.cover2 = std::max(all.cover2, c.cover2());
+        all.det = std::max(all.det, c.det());
+        all.stretch2 = std::max({all.stretch2, glm::dot(c.u, c.u), glm::dot(c.v, c.v)});
+    };
+    for (int corner = 0; corner < 4; ++corner) {
+        const double su = (corner & 1) ? su1 : su0, sv = (corner & 2) ? sv1 : sv0;
+        // Smooth blocks need only half of the eight combinations.
+        const bool first = corner == 0 || corner == 3;
+        if (first || !all.smooth) consider(at(block.zMin, su, sv));
+        if (!first || !all.smooth) consider(at(block.zMax, su, sv));
+    }
+    all.cover2 *= kCornerRoom;
+    return all;
+}
+
+// The plane and the gradient of uniform splats, from the middle cell.
+void setSlopes(const Cells& cells, BlockTask& task) {
+    task.slopeX = task.slopeY = 0;
+    task.uAcross = task.vAcross = task.uDown = task.vDown = 0;
+    const Cell& middle = cells.middle;
+    const double d = middle.det();
+    if (!cells.smooth || !(d > kEdgeOn * cells.stretch2)) return;
+    constexpr double steepest = kSteepestPlane;
+    task.slopeX = static_cast<float>(
+        std::clamp((middle.zu * middle.v.y - middle.zv * middle.u.y) / d, -steepest, steepest));
+    task.slopeY = static_cast<float>(
+        std::clamp((middle.zv * middle.u.x - middle.zu * middle.v.x) / d, -steepest, steepest));
+    const double half = 0.5 * kGradient * std::clamp(d / kFadeTo - 1.0, 0.0, 1.0) / d;
+    task.uAcross = static_cast<float>(middle.v.y * half);
+    task.uDown = static_cast<float>(-middle.v.x * half);
+    task.vAcross = static_cast<float>(-middle.u.y * half);
+    task.vDown = static_cast<float>(middle.u.x * half);
+}
+
+// The pixels that splats of the block may touch; false: none is in the picture.
+bool setReach(const Corners& corners, bool crossing, double cover2, const Camera& novel,
+              BlockTask& task) {
+    const double reach = task.small ? kReachSmall : kReachPixels + kReachRadii * std::sqrt(cover2);
+    task.reach = static_cast<float>(std::min(reach, 1e30));
+    if (crossing) {
+        task.x0 = task.y0 = 0;
+        task.x1 = novel.width - 1;
+        task.y1 = novel.height - 1;
+        return true;
+    }
+    const double x0 = corners.x0 - reach, y0 = corners.y0 - reach;
+    const double x1 = corners.x1 + reach, y1 = corners.y1 + reach;
+    if (!(x1 >= 0 && y1 >= 0 && x0 <= novel.width - 1 && y0 <= novel.height - 1)) return false;
+    task.x0 = static_cast<int>(std::max(0.0, std::floor(x0)));
+    task.y0 = static_cast<int>(std::max(0.0, std::floor(y0)));
+    task.x1 = static_cast<int>(std::min(novel.width - 1.0, std::ceil(x1)));
+    task.y1 = static_cast<int>(std::min(novel.height - 1.0, std::ceil(y1)));
+    return true;
+}
+
 }  // namespace
 
 bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const RectangleImages& s,
@@ -75,85 +184,25 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
     task.u1 = block.u1;
     task.v1 = block.v1;
     task.opaque = block.opaque;
-    const PixelMap& m = s.map;
+    const Corners corners = cornersOf(block, s.map, novel.orthographic);
+    if (!(corners.zMax > 0)) return false;
+    const bool crossing = !(corners.zMin > kCrossing * corners.zMax);
+    task.zMin = crossing ? 0.0f : static_cast<float>(corners.zMin);
 
-    // Where its corners are in the picture. All in front of the camera, they bound the block.
-    double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300, zMin = 1e300, zMax = -1e300;
-    for (int corner = 0; corner < 4; ++corner) {
-        const double u = (corner & 1) ? block.u1 - 1 : block.u0,
-                     v = (corner & 2) ? block.v1 - 1 : block.v0;
-        const glm::dvec3 a = m.a0 + m.au * u + m.av * v, b = m.b0 + m.bu * u + m.bv * v;
-        for (const float z : {block.zMin, block.zMax}) {
-            const glm::dvec3 h = a * double(z) + b;
-            zMin = std::min(zMin, h.z);
-            zMax = std::max(zMax, h.z);
-            const double w = novel.orthographic ? 1.0 : 1.0 / h.z;
-            x0 = std::min(x0, h.x * w);
-            x1 = std::max(x1, h.x * w);
-            y0 = std::min(y0, h.y * w);
-            y1 = std::max(y1, h.y * w);
-        }
-    }
-    if (!(zMax > 0)) return false;
-    const bool crossing = !(zMin > kCrossing * zMax);
-    task.zMin = crossing ? 0.0f : static_cast<float>(zMin);
-
-    // The cells of the block: one where the surface is smooth, else the corners of what occurs.
     const double uc = 0.5 * (block.u0 + block.u1 - 1), vc = 0.5 * (block.v0 + block.v1 - 1);
-    const float unit = 1.0f / kSlopeScale;
-    const float su0 = block.slopeMin.u * unit, su1 = block.slopeMax.u * unit;
-    const float sv0 = block.slopeMin.v * unit, sv1 = block.slopeMax.v * unit;
-    const bool smooth = su1 - su0 < kSmoothSlopes && sv1 - sv0 < kSmoothSlopes &&
-                        block.zMax < kSmoothDepths * block.zMin;
-    double cover2 = 0, det = -1e300, stretch2 = 0;
-    Cell middle = cellAt(s, uc, vc, 0.5 * (block.zMin + block.zMax), 0.5 * (su0 + su1),
-                         0.5 * (sv0 + sv1), novel.orthographic);
-    if (crossing) {
-        cover2 = 1e300;
-        det = 1;
-        stretch2 = 1;
-    } else {
-        const auto consider = [&](const Cell& c) {
-            cover2 = std::max(cover2, c.cover2());
-            det = std::max(det, c.det());
-            stretch2 = std::max({stretch2, glm::dot(c.u, c.u), glm::dot(c.v, c.v)});
-        };
-        for (int corner = 0; corner < 4; ++corner) {
-            const double su = (corner & 1) ? su1 : su0, sv = (corner & 2) ? sv1 : sv0;
-            // Smooth blocks need only half of the eight combinations.
-            const bool first = corner == 0 || corner == 3;
-            if (first || !smooth)
-                consider(cellAt(s, uc, vc, block.zMin, su, sv, novel.orthographic));
-            if (!first || !smooth)
-                consider(cellAt(s, uc, vc, block.zMax, su, sv, novel.orthographic));
-        }
-        cover2 *= kCornerRoom;
-    }
-    if (cullBackFaces && !(det > 0)) return false;
-    cover2 *= block.size * block.size;
+    const Cells cells = cellsOf(block, s, {uc, vc}, crossing, novel.orthographic);
+    if (cullBackFaces && !(cells.det > 0)) return false;
+    const double cover2 = cells.cover2 * (block.size * block.size);
     task.small = cover2 < kSmallCover2;
-    task.uniform = task.small && smooth && block.linked;
+    task.uniform = task.small && cells.smooth && block.linked;
     task.core2 = static_cast<float>(std::max(kLeastCore2, kCornerRoom * cover2));
 
-    task.tolerance = smooth ? kTolerance : kToleranceRough;
-    task.slopeX = task.slopeY = 0;
-    task.uAcross = task.vAcross = task.uDown = task.vDown = 0;
-    if (const double d = middle.det(); smooth && d > kEdgeOn * stretch2) {
-        constexpr double steepest = kSteepestPlane;
-        task.slopeX = static_cast<float>(
-            std::clamp((middle.zu * middle.v.y - middle.zv * middle.u.y) / d, -steepest, steepest));
-        task.slopeY = static_cast<float>(
-            std::clamp((middle.zv * middle.u.x - middle.zu * middle.v.x) / d, -steepest, steepest));
-        const double half = 0.5 * kGradient * std::clamp(d / kFadeTo - 1.0, 0.0, 1.0) / d;
-        task.uAcross = static_cast<float>(middle.v.y * half);
-        task.uDown = static_cast<float>(-middle.v.x * half);
-        task.vAcross = static_cast<float>(-middle.u.y * half);
-        task.vDown = static_cast<float>(middle.u.x * half);
-    }
+    task.tolerance = cells.smooth ? kTolerance : kToleranceRough;
+    setSlopes(cells, task);
 
     // Views that saw the surface close (dense samples) and head-on count more, and those that saw
     // it from about the same place, since looks change with the angle.
-    const double density = 1.0 / std::max(1.0, stretch2);
+    const double density = 1.0 / std::max(1.0, cells.stretch2);
     task.density = std::max(static_cast<float>(density * density), kLeastDensity);
     const auto& c = rectangle.camera();
     const glm::dvec3 point =
@@ -173,24 +222,7 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
                                      : 0.5f;
     task.nearest = 0.999f * least * task.zMin / (1.0f + task.tolerance);
 
-    const double reach = task.small ? kReachSmall : kReachPixels + kReachRadii * std::sqrt(cover2);
-    task.reach = static_cast<float>(std::min(reach, 1e30));
-    if (crossing) {
-        task.x0 = task.y0 = 0;
-        task.x1 = novel.width - 1;
-        task.y1 = novel.height - 1;
-        return true;
-    }
-    x0 -= reach;
-    y0 -= reach;
-    x1 += reach;
-    y1 += reach;
-    if (!(x1 >= 0 && y1 >= 0 && x0 <= novel.width - 1 && y0 <= novel.height - 1)) return false;
-    task.x0 = static_cast<int>(std::max(0.0, std::floor(x0)));
-    task.y0 = static_cast<int>(std::max(0.0, std::floor(y0)));
-    task.x1 = static_cast<int>(std::min(novel.width - 1.0, std::ceil(x1)));
-    task.y1 = static_cast<int>(std::min(novel.height - 1.0, std::ceil(y1)));
-    return true;
+    return setReach(corners, crossing, cover2, novel, task);
 }
 
 }  // namespace stx::splat

@@ -279,7 +279,7 @@ TEST(AtlasFiles, KindsAreToldApart) {
     const TemporaryFolder folder;
     Job job;
     ASSERT_TRUE(writeAtlas(smallAtlas(2, 16, false, false), folder / "a.exr", job));
-    ASSERT_TRUE(writeExrBundle(smallBundle(2, 16, false, false), folder / "b.exr", job));
+    ASSERT_TRUE(writeExrViews(*viewsOf(smallBundle(2, 16, false, false)), folder / "b.exr", job));
     EXPECT_FALSE(readExrBundle(folder / "a.exr", job));
     EXPECT_FALSE(readAtlas(folder / "b.exr", job));
     EXPECT_FALSE(isExrAtlas(*ExrReader::open(folder / "b.exr", Limits())));

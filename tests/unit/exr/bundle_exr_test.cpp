@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 Bytes bytesOf(const Bundle& bundle) {
     const TemporaryFolder folder;
     Job job;
-    const auto written = writeExrBundle(bundle, folder / "a.exr", job);
+    const auto written = writeExrViews(*viewsOf(bundle), folder / "a.exr", job);
     EXPECT_TRUE(written) << written.error().text();
     const auto bytes = readFile(folder / "a.exr", Limits());
     return bytes ? *bytes : Bytes();
@@ -59,7 +59,7 @@ TEST(BundleExr, FileIsReadInPiecesAndNotWhole) {
     const TemporaryFolder folder;
     const Bundle bundle = smallBundle(2, 16, false, false);
     Job job;
-    ASSERT_TRUE(writeExrBundle(bundle, folder / "a.exr", job));
+    ASSERT_TRUE(writeExrViews(*viewsOf(bundle), folder / "a.exr", job));
     // Bytes behind the pixels, which no part of the file uses, beyond what may be held at once.
     fs::resize_file(folder / "a.exr", 300u << 20);
     job.limits.maxMemoryBytes = 64u << 20;
@@ -106,7 +106,7 @@ TEST(BundleExr, HeaderTellsAllWithoutPixels) {
     const TemporaryFolder folder;
     const Bundle bundle = smallBundle(3, 16, true, false);
     Job job;
-    ASSERT_TRUE(writeExrBundle(bundle, folder / "a.exr", job));
+    ASSERT_TRUE(writeExrViews(*viewsOf(bundle), folder / "a.exr", job));
     const auto header = readExrBundleHeader(folder / "a.exr", Limits());
     ASSERT_TRUE(header) << header.error().text();
     EXPECT_EQ(header->title, bundle.title);
@@ -142,7 +142,7 @@ TEST(BundleExr, OtherProgramsUnderstandIt) {
                                                      {1.0, 1.2}, false, 17, 23);
     Job job;
     const auto path = folder / "a.exr";
-    ASSERT_TRUE(writeExrBundle(bundle, path, job));
+    ASSERT_TRUE(writeExrViews(*viewsOf(bundle), path, job));
     bool found = false;
     int status = 0;
     const std::string header = outputOf("exrheader " + path.string(), found, status);
@@ -275,11 +275,11 @@ TEST(BundleExr, ErrorsNameTheFile) {
     ASSERT_FALSE(nothing);
     EXPECT_EQ(nothing.error().text(), "'b.exr': it is not an OpenEXR file");
     const auto unwritable =
-        writeExrBundle(smallBundle(1, 8, false, false), folder / "no/a.exr", job);
+        writeExrViews(*viewsOf(smallBundle(1, 8, false, false)), folder / "no/a.exr", job);
     ASSERT_FALSE(unwritable);
     EXPECT_EQ(unwritable.error().code, ErrorCode::io);
     // What the file system says comes through the library.
-    const auto full = writeExrBundle(smallBundle(1, 8, false, false), "/dev/full", job);
+    const auto full = writeExrViews(*viewsOf(smallBundle(1, 8, false, false)), "/dev/full", job);
     ASSERT_FALSE(full);
     EXPECT_NE(full.error().message.find("No space left"), std::string::npos) << full.error().text();
 }

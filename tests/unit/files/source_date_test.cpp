@@ -40,7 +40,7 @@ TEST_F(SourceDate, StampsOpenExrOnlyWhenAsked) {
     const Bundle bundle = smallBundle(1, 16, false, false);
     const auto dateIn = [&](const char* name) -> std::string {
         Job job;
-        EXPECT_TRUE(writeExrBundle(bundle, folder / name, job));
+        EXPECT_TRUE(writeExrViews(*viewsOf(bundle), folder / name, job));
         const auto reader = ExrReader::open(folder / name, Limits());
         if (!reader) return reader.error().text();
         const auto* date = reader->parts()[0].attribute<std::string>("capDate");

@@ -54,12 +54,12 @@ TEST(DeepColour, ComesBackToTheBitThroughOpenExr) {
     options.deepColour = true;
     const auto bundle = readImageSet(folder.path(), options, job);
     ASSERT_TRUE(bundle) << bundle.error().text();
-    ASSERT_TRUE(writeExrBundle(*bundle, folder / "b.exr", job));
+    ASSERT_TRUE(writeExrViews(*viewsOf(*bundle), folder / "b.exr", job));
     const auto back = readExrBundle(folder / "b.exr", job);
     ASSERT_TRUE(back) << back.error().text();
     ExportOptions write;
     write.linearAsPng = true;
-    ASSERT_TRUE(exportImages(*back, folder / "out", write, job));
+    ASSERT_TRUE(exportViews(*viewsOf(*back), folder / "out", write, job));
     for (const std::string& note : job.takeNotes())
         EXPECT_EQ(note.find("colour"), std::string::npos) << note;
     const auto found = codesOf(folder / "out/images/a.png");
@@ -106,7 +106,7 @@ TEST(DeepColour, PicturesOfEightBitsBesideItComeBackToo) {
     ASSERT_TRUE(bundle) << bundle.error().text();
     ExportOptions write;
     write.linearAsPng = true;
-    ASSERT_TRUE(exportImages(*bundle, folder / "out", write, job));
+    ASSERT_TRUE(exportViews(*viewsOf(*bundle), folder / "out", write, job));
     const auto found = codesOf(folder / "out/images/b.png");
     ASSERT_EQ(found.size(), bytes.size());
     for (std::size_t i = 0; i < bytes.size(); ++i)
@@ -124,11 +124,11 @@ TEST(DeepColour, SaysWhatPngCannotHold) {
     ExportOptions write;
     write.linearAsPng = true;
     Job job;
-    ASSERT_TRUE(exportImages(bundle, folder / "a", write, job));
+    ASSERT_TRUE(exportViews(*viewsOf(bundle), folder / "a", write, job));
     EXPECT_EQ(job.takeNotes().back(), "linear colour becomes 16-bit sRGB");
     linear.at(3, 3).g = 1.5f;
     bundle.views[0].texture = Texture(linear);
-    ASSERT_TRUE(exportImages(bundle, folder / "b", write, job));
+    ASSERT_TRUE(exportViews(*viewsOf(bundle), folder / "b", write, job));
     EXPECT_EQ(job.takeNotes().back(),
               "linear colour becomes 16-bit sRGB; values above 1 are clipped");
 }

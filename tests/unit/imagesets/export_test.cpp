@@ -25,7 +25,7 @@ TEST_P(Export, ComesBackEqualToTheBit) {
     Job job;
     ExportOptions options;
     options.kind = kind;
-    const auto written = exportImages(bundle, folder / "set", options, job);
+    const auto written = exportViews(*viewsOf(bundle), folder / "set", options, job);
     ASSERT_TRUE(written) << written.error().text();
     const auto recognised = recogniseImageSet(folder / "set");
     ASSERT_TRUE(recognised) << recognised.error().text();
@@ -40,9 +40,9 @@ TEST_P(Export, ComesBackEqualToTheBit) {
         EXPECT_TRUE(a == b) << a.fx - b.fx << " " << a.cx - b.cx << " " << a.cy - b.cy;
     }
     // Again into the same folder: it is ours to replace.
-    EXPECT_TRUE(exportImages(bundle, folder / "set", options, job));
+    EXPECT_TRUE(exportViews(*viewsOf(bundle), folder / "set", options, job));
     options.noClobber = true;
-    EXPECT_FALSE(exportImages(bundle, folder / "set", options, job));
+    EXPECT_FALSE(exportViews(*viewsOf(bundle), folder / "set", options, job));
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Export,
@@ -58,7 +58,7 @@ TEST(Export, ComesBackWithoutOurOwnKeys) {
         Job job;
         ExportOptions options;
         options.kind = kind;
-        ASSERT_TRUE(exportImages(bundle, folder / "set", options, job));
+        ASSERT_TRUE(exportViews(*viewsOf(bundle), folder / "set", options, job));
         std::filesystem::path file;
         for (const auto& entry : std::filesystem::directory_iterator(folder / "set"))
             if (entry.path().extension() == ".json") file = entry.path();
@@ -100,7 +100,7 @@ TEST(Export, IntegerDepthIsRoundedByNoMoreThanItsNoteSays) {
         ExportOptions options;
         options.kind = kind;
         options.depth = ExportOptions::Depth::png;
-        ASSERT_TRUE(exportImages(bundle, folder / "set", options, job));
+        ASSERT_TRUE(exportViews(*viewsOf(bundle), folder / "set", options, job));
         ASSERT_FALSE(job.takeNotes().empty());
         ImageSetOptions read;
         read.depthBits = 32;
@@ -129,7 +129,7 @@ TEST(Export, RefusesAForeignFolderAndLeavesItAlone) {
     std::filesystem::create_directory(folder / "mine");
     std::ofstream(folder / "mine/diary.txt") << "keep";
     Job job;
-    EXPECT_FALSE(exportImages(smallBundle(1, 16, false, false), folder / "mine", {}, job));
+    EXPECT_FALSE(exportViews(*viewsOf(smallBundle(1, 16, false, false)), folder / "mine", {}, job));
     EXPECT_TRUE(std::filesystem::exists(folder / "mine/diary.txt"));
     EXPECT_FALSE(std::filesystem::exists(folder / "mine/transforms.json"));
 }

@@ -169,7 +169,8 @@ TEST(FilmPairs, WhatIsMissingIsSaid) {
 
 TEST(AzureKinect, ColourIsWarpedToDepth) {
     REQUIRE_SHARED(recording, "data/motion/azure-kinect/recording.mkv");
-    if (const auto video = videoModule(); !video.present) GTEST_SKIP() << video.reason;
+    if (const auto video = VideoProcess::start(Limits()); !video)
+        GTEST_SKIP() << video.error().message;
     Job job;
     const auto read = openImageSet(recording, {}, job);
     ASSERT_TRUE(read) << read.error().text();

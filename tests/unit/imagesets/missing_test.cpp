@@ -36,7 +36,7 @@ TEST(MissingFiles, OfTransformsLeaveTheirViewOut) {
     TemporaryFolder folder;
     Job job;
     const auto set = folder / "set";
-    ASSERT_TRUE(exportImages(bundle, set, {}, job));
+    ASSERT_TRUE(exportViews(*viewsOf(bundle), set, {}, job));
     std::filesystem::remove(set / "images/v1.png");
     expectTwoOfThree(set, "v1.png");
     std::filesystem::remove(set / "images/v0.png");

@@ -191,7 +191,7 @@ TEST(SetViewsOnDemand, AreThoseOfOurExportsAndColmaps) {
         Job job;
         ExportOptions write;
         write.kind = kind;
-        const auto done = exportImages(bundle, folder / "set", write, job);
+        const auto done = exportViews(*viewsOf(bundle), folder / "set", write, job);
         ASSERT_TRUE(done) << done.error().text();
         expectSameOnDemand(folder / "set", {});
     }

@@ -97,7 +97,7 @@ TEST(BackgroundNode, ComesBackFromEveryContainer) {
     for (const char* name : {"a.mp4", "a.bt", "a.xmt"}) {
         SCOPED_TRACE(name);
         Job job;
-        const auto written = writeMpeg4Bundle(bundle, folder / name, job);
+        const auto written = writeMpeg4Views(*viewsOf(bundle), folder / name, job);
         ASSERT_TRUE(written) << written.error().text();
         const auto back = readMpeg4Bundle(folder / name, job);
         ASSERT_TRUE(back) << back.error().text();
@@ -107,7 +107,7 @@ TEST(BackgroundNode, ComesBackFromEveryContainer) {
         EXPECT_EQ(back->environment->skyColours, e.skyColours);
         EXPECT_LT(std::abs(1 - glm::dot(back->environment->orientation, e.orientation)), 1e-12);
         // Written again, it has the same bytes.
-        ASSERT_TRUE(writeMpeg4Bundle(*back, again / name, job));
+        ASSERT_TRUE(writeMpeg4Views(*viewsOf(*back), again / name, job));
         EXPECT_TRUE(*readFile(folder / name, {}) == *readFile(again / name, {}));
     }
     // A file beside a text is named after what it is for.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "formats/mpeg4/bifs/bit_stream.hpp"
+#include "tests/same_scenes.hpp"
 #include "tests/unit/mpeg4/core_fixtures.hpp"
 
 namespace stx::mpeg4 {

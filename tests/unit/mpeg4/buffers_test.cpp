@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/same_scenes.hpp"
 #include "tests/unit/mpeg4/round_trips.hpp"
 
 namespace stx::mpeg4 {

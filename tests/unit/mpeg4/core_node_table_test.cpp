@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/mpeg4/scene/scene.hpp"
+#include "tests/same_scenes.hpp"
 #include "tests/shared_data.hpp"
 
 namespace stx::mpeg4 {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "formats/files/files.hpp"
+#include "tests/same_scenes.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mpeg4/round_trips.hpp"
 

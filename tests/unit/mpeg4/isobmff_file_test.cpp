@@ -7,6 +7,7 @@
 
 #include "formats/files/byte_io.hpp"
 #include "formats/mpeg4/container/image_headers.hpp"
+#include "tests/same_scenes.hpp"
 #include "tests/unit/mpeg4/core_fixtures.hpp"
 
 namespace stx::mpeg4 {
@@ -76,7 +77,7 @@ Bytes written(const Document& document) {
 
 std::string errorOf(const Bytes& bytes) {
     Job job;
-    const auto document = readMp4(ByteSource::fromView(bytes), job);
+    const auto document = readMp4(ByteSource::fromBytes(bytes), job);
     return document ? "read" : document.error().text();
 }
 
@@ -101,7 +102,7 @@ TEST(IsobmffFile, WritesWhatItIsGivenAndNothingOfTheDay) {
     const Bytes bytes = written(sample());
     EXPECT_EQ(bytes, written(sample()));
     Job job;
-    const auto document = readMp4(ByteSource::fromView(bytes), job);
+    const auto document = readMp4(ByteSource::fromBytes(bytes), job);
     ASSERT_TRUE(document) << document.error().text();
     EXPECT_TRUE(document->mp4->deviations.empty());
     EXPECT_TRUE(document->mp4->moovFirst);
@@ -145,7 +146,7 @@ TEST(IsobmffFile, WritesTheJpegDescriptionOfTheOtherImplementation) {
     EXPECT_EQ(hex(jpegDecoderSpecificInfo(*header)), "00 14 00 01 00 01 03");
     const Bytes mp4 = written(smallDocument(ByteRange::of(*bytes), ByteRange::of(pngHead(16, 12))));
     Job job;
-    const auto document = readMp4(ByteSource::fromView(mp4), job);
+    const auto document = readMp4(ByteSource::fromBytes(mp4), job);
     ASSERT_TRUE(document);
     const ElementaryStream& stream = document->findObjectDescriptor(10)->streams.at(0);
     EXPECT_EQ(stream.objectTypeIndication, oti::kJpeg);

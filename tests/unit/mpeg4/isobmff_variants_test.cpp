@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/same_scenes.hpp"
 #include "tests/unit/mpeg4/core_fixtures.hpp"
 
 namespace stx::mpeg4 {

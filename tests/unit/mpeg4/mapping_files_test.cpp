@@ -4,6 +4,7 @@
 #include "formats/mpeg4/container/isobmff.hpp"
 #include "formats/mpeg4/media_files.hpp"
 #include "formats/mpeg4/text/bt.hpp"
+#include "tests/same_scenes.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/mpeg4/mapping_fixtures.hpp"
 
@@ -31,7 +32,7 @@ TEST(Mpeg4Files, ABundleIsTheSameFromEveryContainer) {
     Job job;
     std::vector<Bundle> read;
     for (const char* name : {"a.mp4", "a.bt", "a.xmt"}) {
-        mustWrite(writeMpeg4Bundle(bundle, folder / name, job));
+        mustWrite(writeMpeg4Views(*viewsOf(bundle), folder / name, job));
         auto back = readMpeg4Bundle(folder / name, job);
         ASSERT_TRUE(back) << name << ": " << back.error().text();
         read.push_back(std::move(*back));
@@ -54,7 +55,7 @@ TEST(Mpeg4Files, ABundleIsTheSameFromEveryContainer) {
 TEST(Mpeg4Files, Mp4ThroughATextIsTheSameFile) {
     const TemporaryFolder folder("roundtrip");
     Job job;
-    mustWrite(writeMpeg4Bundle(twoViews(), folder / "a.mp4", job));
+    mustWrite(writeMpeg4Views(*viewsOf(twoViews()), folder / "a.mp4", job));
     const Bytes original = bytesOfFile(folder / "a.mp4");
     for (const char* name : {"b.bt", "c.xmt"}) {
         auto document = readMpeg4(folder / "a.mp4", job);
@@ -70,7 +71,7 @@ TEST(Mpeg4Files, Mp4ThroughATextIsTheSameFile) {
 TEST(Mpeg4Files, ImagesOfAnMp4AreNamedByWhatTheyAreFor) {
     const TemporaryFolder folder("names");
     Job job;
-    mustWrite(writeMpeg4Bundle(twoViews(), folder / "a.mp4", job));
+    mustWrite(writeMpeg4Views(*viewsOf(twoViews()), folder / "a.mp4", job));
     const auto document = readMpeg4(folder / "a.mp4", job);
     ASSERT_TRUE(document) << document.error().text();
     EXPECT_EQ(mediaFileNames(*document),
@@ -255,15 +256,15 @@ TEST(Mpeg4Files, WritingTwiceReplacesTextAndImages) {
     const TemporaryFolder folder("twice");
     Job job;
     Bundle bundle = twoViews();
-    mustWrite(writeMpeg4Bundle(bundle, folder / "a.bt", job));
+    mustWrite(writeMpeg4Views(*viewsOf(bundle), folder / "a.bt", job));
     bundle.views.pop_back();
     bundle.views[0].name = "other";
-    mustWrite(writeMpeg4Bundle(bundle, folder / "a.bt", job));
+    mustWrite(writeMpeg4Views(*viewsOf(bundle), folder / "a.bt", job));
     EXPECT_FALSE(fs::exists(folder / "a_images" / "view2_texture.png"));
     EXPECT_TRUE(fs::exists(folder / "a_images" / "other_texture.png"));
     // A stranger's file in that folder is not an image of ours.
     std::ofstream(folder / "a_images" / "letter.txt") << "dear";
-    const auto refused = writeMpeg4Bundle(bundle, folder / "a.bt", job);
+    const auto refused = writeMpeg4Views(*viewsOf(bundle), folder / "a.bt", job);
     ASSERT_FALSE(refused);
     EXPECT_NE(refused.error().text().find("letter.txt"), std::string::npos);
     EXPECT_TRUE(fs::exists(folder / "a_images" / "letter.txt"));
@@ -300,7 +301,7 @@ TEST(Mpeg4Files, ImageNamesStayInsideTheFolder) {
 TEST(Mpeg4Files, EndingsAreChecked) {
     const TemporaryFolder folder("endings");
     Job job;
-    const auto refused = writeMpeg4Bundle(twoViews(), folder / "a.avi", job);
+    const auto refused = writeMpeg4Views(*viewsOf(twoViews()), folder / "a.avi", job);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::usage);
     std::ofstream(folder / "x.dat") << "nothing";

@@ -5,6 +5,7 @@
 #include "formats/mpeg4/bifs/script_code.hpp"
 #include "formats/mpeg4/text/bt.hpp"
 #include "formats/mpeg4/text/xmt.hpp"
+#include "tests/same_scenes.hpp"
 #include "tests/unit/mpeg4/core_fixtures.hpp"
 #include "tests/unit/mpeg4/mapping_fixtures.hpp"
 #include "tests/unit/mpeg4/round_trips.hpp"

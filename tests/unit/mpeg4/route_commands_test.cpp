@@ -6,6 +6,7 @@
 
 #include "formats/mpeg4/text/bt.hpp"
 #include "formats/mpeg4/text/xmt.hpp"
+#include "tests/same_scenes.hpp"
 #include "tests/unit/mpeg4/round_trips.hpp"
 
 namespace stx::mpeg4 {

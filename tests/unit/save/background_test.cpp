@@ -50,7 +50,7 @@ TEST(BackgroundView, ComesBackFromEveryContainer) {
         } else {
             ExportOptions how;
             if (path.filename() == "miv") how.kind = ExportOptions::Kind::miv;
-            ASSERT_TRUE(exportImages(bundle, path, how, job));
+            ASSERT_TRUE(exportViews(*viewsOf(bundle), path, how, job));
         }
         const auto back = openBundle(path, {}, job);
         ASSERT_TRUE(back) << back.error().text();

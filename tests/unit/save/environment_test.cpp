@@ -42,7 +42,7 @@ TEST(KeptEnvironment, ComesBackFromEveryContainer) {
             } else {
                 ExportOptions how;
                 if (path.filename() == "miv") how.kind = ExportOptions::Kind::miv;
-                const auto written = exportImages(bundle, path, how, job);
+                const auto written = exportViews(*viewsOf(bundle), path, how, job);
                 ASSERT_TRUE(written) << written.error().text();
             }
             const auto back = openBundle(path, {}, job);
@@ -93,7 +93,7 @@ TEST(KeptEnvironment, ColmapHasNoPlaceForIt) {
     how.kind = ExportOptions::Kind::colmap;
     Bundle bundle = torusInAPlace(turnedCube());
     std::erase_if(bundle.views, [](const ReferenceView& v) { return v.camera.orthographic; });
-    const auto written = exportImages(bundle, folder / "colmap", how, job);
+    const auto written = exportViews(*viewsOf(bundle), folder / "colmap", how, job);
     ASSERT_TRUE(written) << written.error().text();
     bool told = false;
     for (const auto& note : job.takeNotes())

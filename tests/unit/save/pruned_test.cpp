@@ -87,7 +87,7 @@ TEST(Pruned, ComesBackFromEveryContainer) {
         } else {
             ExportOptions options;
             if (path.filename() == "miv") options.kind = ExportOptions::Kind::miv;
-            ASSERT_TRUE(exportImages(bundle, path, options, job));
+            ASSERT_TRUE(exportViews(*viewsOf(bundle), path, options, job));
         }
         const auto back = openBundle(path, {}, job);
         ASSERT_TRUE(back) << back.error().text();
@@ -154,7 +154,7 @@ TEST(UnknownDepth, ComesBackFromEveryContainer) {
             } else {
                 ExportOptions how;
                 if (path.filename() == "miv") how.kind = ExportOptions::Kind::miv;
-                ASSERT_TRUE(exportImages(bundle, path, how, job));
+                ASSERT_TRUE(exportViews(*viewsOf(bundle), path, how, job));
             }
             auto back = path.filename() == "atlas"
                             ? readAtlas(path, job).and_then(

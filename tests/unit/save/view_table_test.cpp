@@ -316,7 +316,7 @@ TEST(ViewTable, IsBakedAndExportedAsItsBundleIs) {
          {ExportOptions::Kind::transforms, ExportOptions::Kind::miv, ExportOptions::Kind::colmap}) {
         ExportOptions options;
         options.kind = kind;
-        ASSERT_TRUE(exportImages(baked, folder / "whole", options, job));
+        ASSERT_TRUE(exportViews(*viewsOf(baked), folder / "whole", options, job));
         const auto exported = exportViews(*changed, folder / "table", options, job);
         ASSERT_TRUE(exported) << exported.error().text();
         std::size_t files = 0;

@@ -47,7 +47,7 @@ std::unique_ptr<Sequence> through(const std::string& target, Sequence& frames,
 std::vector<std::string> containers() {
     std::vector<std::string> all = {"film.mp4",      "film.bt", "film.xmt",
                                     "film_%02d.exr", "set",     "atlas_%02d"};
-    if (videoModule().present) all.emplace_back("h264.mp4");
+    if (VideoProcess::start(Limits())) all.emplace_back("h264.mp4");
     return all;
 }
 

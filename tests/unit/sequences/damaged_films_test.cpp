@@ -179,7 +179,7 @@ TEST(DamagedFilms, SamplesMayBeDamaged) {
     TemporaryFolder folder;
     MovingViews frames(6, 25, false);
     for (const bool video : {false, true}) {
-        if (video && !videoModule().present) continue;
+        if (video && !VideoProcess::start(Limits())) continue;
         const auto path = folder / "film.mp4";
         Job job;
         SaveOptions save;

@@ -66,7 +66,7 @@ TEST(Sheet, WritesNamesCamerasAndTheRangeOfDepth) {
     Job job;
     SheetSettings settings;
     settings.title = "the title";
-    const auto sheet = sheetOf(evenBundle(2, 150), settings, job);
+    const auto sheet = sheetOf(*viewsOf(evenBundle(2, 150)), settings, job);
     ASSERT_TRUE(sheet) << sheet.error().text();
     EXPECT_EQ(sheet->shown, 2);
     for (const char* text : {"the title", "0 v0", "1 v1", "at 0 0 4", "towards 0 0 -1",
@@ -82,7 +82,7 @@ TEST(Sheet, IsNoLargerThanAskedFor) {
         Job job;
         SheetSettings settings;
         settings.mostSize = most;
-        const auto sheet = sheetOf(bundle, settings, job);
+        const auto sheet = sheetOf(*viewsOf(bundle), settings, job);
         ASSERT_TRUE(sheet) << most.x << "x" << most.y << ": " << sheet.error().text();
         EXPECT_LE(sheet->picture.width(), most.x);
         EXPECT_LE(sheet->picture.height(), most.y);
@@ -95,7 +95,7 @@ TEST(Sheet, ShowsAsManyViewsAsFitAndSaysSo) {
     Job job;
     SheetSettings settings;
     settings.mostSize = {500, 500};
-    const auto sheet = sheetOf(evenBundle(60, 64), settings, job);
+    const auto sheet = sheetOf(*viewsOf(evenBundle(60, 64)), settings, job);
     ASSERT_TRUE(sheet) << sheet.error().text();
     EXPECT_LT(sheet->shown, 60);
     EXPECT_TRUE(holdsText(sheet->picture, std::to_string(sheet->shown) + " of 60 views are shown"));
@@ -105,7 +105,7 @@ TEST(Sheet, ThatIsTooSmallIsAnErrorThatNamesASizeThatWillDo) {
     Job job;
     SheetSettings settings;
     settings.mostSize = {100, 50};
-    const auto small = sheetOf(evenBundle(3, 64), settings, job);
+    const auto small = sheetOf(*viewsOf(evenBundle(3, 64)), settings, job);
     ASSERT_FALSE(small);
     EXPECT_EQ(small.error().code, ErrorCode::usage);
     const std::string text = small.error().message;
@@ -113,13 +113,13 @@ TEST(Sheet, ThatIsTooSmallIsAnErrorThatNamesASizeThatWillDo) {
     ASSERT_NE(at, std::string::npos) << text;
     settings.mostSize.x = std::atoi(text.c_str() + at + 2);
     settings.mostSize.y = std::atoi(text.c_str() + text.find('x', at) + 1);
-    EXPECT_TRUE(sheetOf(evenBundle(3, 64), settings, job)) << text;
+    EXPECT_TRUE(sheetOf(*viewsOf(evenBundle(3, 64)), settings, job)) << text;
 }
 
 TEST(Sheet, TakesNoMoreMemoryThanTheLimit) {
     Job job;
     job.limits.maxMemoryBytes = 1 << 20;
-    const auto sheet = sheetOf(evenBundle(4, 300), {}, job);
+    const auto sheet = sheetOf(*viewsOf(evenBundle(4, 300)), {}, job);
     ASSERT_FALSE(sheet);
     EXPECT_NE(sheet.error().message.find("the sheet"), std::string::npos);
 }

@@ -215,7 +215,7 @@ TEST_F(Origin, ExportsAreInTheWorldAndComeBackToTheBit) {
     for (const auto kind : {ExportOptions::Kind::transforms, ExportOptions::Kind::miv}) {
         const bool miv = kind == ExportOptions::Kind::miv;
         const auto folder = folder_ / (miv ? "miv" : "nerf");
-        ASSERT_TRUE(exportImages(*bundle, folder, {.kind = kind}, job_));
+        ASSERT_TRUE(exportViews(*viewsOf(*bundle), folder, {.kind = kind}, job_));
         const auto back = open(folder, {}, job_);
         ASSERT_TRUE(back) << back.error().text();
         const auto& read = std::get<Bundle>(*back).views;
@@ -255,7 +255,7 @@ TEST_F(Origin, ImageSetsFarOffGetOne) {
     ASSERT_TRUE(bundle);
     const auto local = bundle->views[0].camera.position;
     for (auto& view : bundle->views) view.camera.position += kUtm;
-    ASSERT_TRUE(exportImages(*bundle, folder_ / "set", {}, job_));
+    ASSERT_TRUE(exportViews(*viewsOf(*bundle), folder_ / "set", {}, job_));
     const auto back = open(folder_ / "set", {}, job_);
     ASSERT_TRUE(back) << back.error().text();
     EXPECT_EQ(originOf(*back), kUtm);

@@ -37,7 +37,7 @@ TEST(ValidateImageSets, MissingFilesAreFindingsAndAllOfThem) {
         const auto set = folder / (miv ? "miv" : "transforms");
         ExportOptions options;
         options.kind = kind;
-        ASSERT_TRUE(exportImages(smallBundle(3, 16, false, false), set, options, job));
+        ASSERT_TRUE(exportViews(*viewsOf(smallBundle(3, 16, false, false)), set, options, job));
         EXPECT_EQ(rulesOf(set), Numbers{});
         for (const char* name : {"view_0", "view_2"})
             ASSERT_TRUE(
@@ -55,7 +55,7 @@ TEST(ValidateImageSets, MissingFilesAreFindingsAndAllOfThem) {
 TEST(ValidateImageSets, WhatCannotBeReadBreaksRule1001) {
     const TemporaryFolder folder;
     Job job;
-    ASSERT_TRUE(exportImages(smallBundle(1, 16, false, false), folder / "set", {}, job));
+    ASSERT_TRUE(exportViews(*viewsOf(smallBundle(1, 16, false, false)), folder / "set", {}, job));
     std::filesystem::resize_file(folder / "set/depth/view_0.exr", 200);
     EXPECT_EQ(rulesOf(folder / "set"), Numbers{1001});
     std::ofstream(folder / "set/transforms.json") << "{";

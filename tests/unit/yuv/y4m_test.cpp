@@ -66,7 +66,8 @@ bool has(const std::string& text, std::string_view part) {
 }
 
 Result<Y4mReader> openText(std::string_view text, Job& job) {
-    return Y4mReader::open(ByteSource::fromView(std::as_bytes(std::span(text))), job);
+    const auto bytes = std::as_bytes(std::span(text));
+    return Y4mReader::open(ByteSource::fromBytes(Bytes(bytes.begin(), bytes.end())), job);
 }
 
 TEST(Y4mReader, GivesBackWhatOurWriterWrote) {

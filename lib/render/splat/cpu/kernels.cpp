@@ -173,26 +173,107 @@ HWY_INLINE bool canReadAround(const RectangleImages& s, std::size_t pixel, int c
            at + s.stride + lanes <= s.after;
 }
 
+// The small splats of a row of points, lane by lane.
+struct SmallSplats {
+    HWY_ALIGN std::int32_t offset[kBlock];  // of the upper left of their four pixels
+    HWY_ALIGN float w00[kBlock], w10[kBlock], w01[kBlock], w11[kBlock];
+    HWY_ALIGN float fractionX[kBlock], fractionY[kBlock];
+    HWY_ALIGN float uAcross[kBlock], vAcross[kBlock], uDown[kBlock], vDown[kBlock];
+};
+
+// Weights of small splats on their four pixels; the lanes that add to any.
+HWY_INLINE hn::Mask<DF> weighSmall(DF d, const Splats& p, VF tolerance, const Region& region,
+                                   RowOfPoints& r) {
+    const DI di;
+    const VF one = hn::Set(d, 1.0f);
+    const VI stride = hn::Set(di, region.stride), nextPixel = hn::Set(di, 1);
+    const VF fx = p.at.fx, fy = p.at.fy;
+    const VF gx = hn::Sub(one, fx), gy = hn::Sub(one, fy);
+    const VF zx = hn::Mul(p.at.z, p.slopeX), zy = hn::Mul(p.at.z, p.slopeY);
+    const VF z = hn::NegMulAdd(fx, zx, hn::NegMulAdd(fy, zy, p.at.z));
+    const auto weigh = [&](VF wx, VF wy, VF depth, VI at, VF& weight) HWY_ATTR {
+        const VF front = hn::GatherIndex(d, region.depth, at);
+        const auto near = hn::And(p.small, hn::Le(depth, hn::Mul(front, tolerance)));
+        weight = hn::IfThenElseZero(near, hn::Mul(wx, wy));
+        return near;
+    };
+    const VF x0 = hn::Mul(p.quality, lowPass(d, hn::Mul(fx, fx)));
+    const VF x1 = hn::Mul(p.quality, lowPass(d, hn::Mul(gx, gx)));
+    const VF y0 = lowPass(d, hn::Mul(fy, fy)), y1 = lowPass(d, hn::Mul(gy, gy));
+    const VI below = hn::Add(p.at.offset, stride);
+    const VF zRight = hn::Add(z, zx);
+    return hn::Or(hn::Or(weigh(x0, y0, z, p.at.offset, r.w00),
+                         weigh(x1, y0, zRight, hn::Add(p.at.offset, nextPixel), r.w10)),
+                  hn::Or(weigh(x0, y1, hn::Add(z, zy), below, r.w01),
+                         weigh(x1, y1, hn::Add(zRight, zy), hn::Add(below, nextPixel), r.w11)));
+}
+
+// Adds the small splat of pixel `pixel` + `k` to its four pixels.
+template <bool kOpaque, bool kNormals>
+HWY_INLINE void addSmall(const RectangleImages& s, std::size_t pixel, const SmallSplats& all, int k,
+                         const Region& region) {
+    PointColour point = pointColourOf(s, pixel + k, kOpaque);
+    if (all.uAcross[k] != 0 || all.vDown[k] != 0)
+        addGradient(s, pixel + k, all.uAcross[k], all.vAcross[k], all.uDown[k], all.vDown[k],
+                    point);
+    const float w00 = all.w00[k], w10 = all.w10[k], w01 = all.w01[k], w11 = all.w11[k];
+    const Four c00 =
+        plus(plus(point.colour, -all.fractionX[k], point.across), -all.fractionY[k], point.down);
+    const Four c01 = plus(c00, point.down);
+    const std::size_t at = static_cast<std::size_t>(all.offset[k]);
+    const std::size_t under = at + static_cast<std::size_t>(region.stride);
+    addToPair(region.colour + 4 * at, w00, c00, w10, plus(c00, point.across));
+    addToPair(region.colour + 4 * under, w01, c01, w11, plus(c01, point.across));
+    if (!kOpaque) {
+        region.missing[at] += w00 * point.missing;
+        region.missing[at + 1] += w10 * point.missing;
+        region.missing[under] += w01 * point.missing;
+        region.missing[under + 1] += w11 * point.missing;
+    }
+    if (kNormals) {
+        addToPair(region.normals + 4 * at, w00, point.normal, w10, point.normal);
+        addToPair(region.normals + 4 * under, w01, point.normal, w11, point.normal);
+    }
+}
+
+// Adds the large splats among those from `pixel` on.
+template <bool kOpaque, bool kNormals>
+HWY_INLINE void colourLarge(DF d, const RectangleImages& s, const Splats& p, std::size_t pixel,
+                            float tolerance, const Region& region) {
+    const std::uint32_t large = bitsOf(d, p.large);
+    if (!large) return;
+    const auto colourOf = [&](int k, const Steps& steps) HWY_ATTR {
+        PointColour point = pointColourOf(s, pixel + k, kOpaque);
+        if (steps.uAcross != 0 || steps.vDown != 0)
+            addGradient(s, pixel + k, steps.uAcross, steps.vAcross, steps.uDown, steps.vDown,
+                        point);
+        return point;
+    };
+    forLarge<true>(
+        d, p, large, region,
+        [&](int k, const Patch& patch, const Steps& steps) HWY_ATTR {
+            colourPatch<kOpaque, kNormals>(patch, colourOf(k, steps), tolerance, region);
+        },
+        [&](int k, const Ellipse& e, const Steps& steps) HWY_ATTR {
+            colourEllipse<kOpaque, kNormals>(d, e, colourOf(k, steps), tolerance, region);
+        });
+}
+
 template <bool kUniform, bool kOpaque, bool kNormals>
 void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead,
                  const Region& region) {
     const DF d;
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
-    const VF one = hn::Set(d, 1.0f);
     const VF tolerance = hn::Set(d, 1.0f + t.tolerance);
-    const VI stride = hn::Set(di, region.stride), nextPixel = hn::Set(di, 1);
-    HWY_ALIGN std::int32_t offset[kBlock];
-    HWY_ALIGN float w00[kBlock], w10[kBlock], w01[kBlock], w11[kBlock];
-    HWY_ALIGN float fractionX[kBlock], fractionY[kBlock];
-    HWY_ALIGN float uAcross[kBlock], vAcross[kBlock], uDown[kBlock], vDown[kBlock];
+    SmallSplats all;
     if (kUniform) {
         // The same for all pixels.
         for (int i = 0; i < kBlock; ++i) {
-            uAcross[i] = t.uAcross;
-            vAcross[i] = t.vAcross;
-            uDown[i] = t.uDown;
-            vDown[i] = t.vDown;
+            all.uAcross[i] = t.uAcross;
+            all.vAcross[i] = t.vAcross;
+            all.uDown[i] = t.uDown;
+            all.vDown[i] = t.vDown;
         }
     }
     RowMap map(s.map, t.u0, t.v0);
@@ -208,100 +289,41 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
                 p.small = hn::And(p.small, any);
                 p.large = hn::And(p.large, any);
             }
-            if (!kUniform) {
-                const auto colourOf = [&](int k, const Steps& steps) HWY_ATTR {
-                    PointColour point = pointColourOf(s, pixel + k, kOpaque);
-                    if (steps.uAcross != 0 || steps.vDown != 0)
-                        addGradient(s, pixel + k, steps.uAcross, steps.vAcross, steps.uDown,
-                                    steps.vDown, point);
-                    return point;
-                };
-                if (const std::uint32_t large = bitsOf(d, p.large))
-                    forLarge<true>(
-                        d, p, large, region,
-                        [&](int k, const Patch& patch, const Steps& steps) HWY_ATTR {
-                            colourPatch<kOpaque, kNormals>(patch, colourOf(k, steps), t.tolerance,
-                                                           region);
-                        },
-                        [&](int k, const Ellipse& e, const Steps& steps) HWY_ATTR {
-                            colourEllipse<kOpaque, kNormals>(d, e, colourOf(k, steps), t.tolerance,
-                                                             region);
-                        });
-            }
+            if (!kUniform) colourLarge<kOpaque, kNormals>(d, s, p, pixel, t.tolerance, region);
             if (hn::AllFalse(d, p.small)) continue;
-            const VF fx = p.at.fx, fy = p.at.fy;
-            const VF gx = hn::Sub(one, fx), gy = hn::Sub(one, fy);
-            const VF zx = hn::Mul(p.at.z, p.slopeX), zy = hn::Mul(p.at.z, p.slopeY);
-            const VF z = hn::NegMulAdd(fx, zx, hn::NegMulAdd(fy, zy, p.at.z));
-            const auto weigh = [&](VF wx, VF wy, VF depth, VI at, VF& weight) HWY_ATTR {
-                const VF front = hn::GatherIndex(d, region.depth, at);
-                const auto near = hn::And(p.small, hn::Le(depth, hn::Mul(front, tolerance)));
-                weight = hn::IfThenElseZero(near, hn::Mul(wx, wy));
-                return near;
-            };
             RowOfPoints r;
-            const VF x0 = hn::Mul(p.quality, lowPass(d, hn::Mul(fx, fx)));
-            const VF x1 = hn::Mul(p.quality, lowPass(d, hn::Mul(gx, gx)));
-            const VF y0 = lowPass(d, hn::Mul(fy, fy)), y1 = lowPass(d, hn::Mul(gy, gy));
-            const VI below = hn::Add(p.at.offset, stride);
-            const VF zRight = hn::Add(z, zx);
-            const auto any = hn::Or(
-                hn::Or(weigh(x0, y0, z, p.at.offset, r.w00),
-                       weigh(x1, y0, zRight, hn::Add(p.at.offset, nextPixel), r.w10)),
-                hn::Or(weigh(x0, y1, hn::Add(z, zy), below, r.w01),
-                       weigh(x1, y1, hn::Add(zRight, zy), hn::Add(below, nextPixel), r.w11)));
+            const auto any = weighSmall(d, p, tolerance, region, r);
             const std::uint32_t bits = bitsOf(d, any);
             if (!bits) continue;
-            hn::Store(p.at.offset, di, offset);
+            hn::Store(p.at.offset, di, all.offset);
             if (kWholeRows && kOpaque && canReadAround(s, pixel, count, lanes)) {
                 // Zeros are added for the others: what they hold must be numbers.
-                r.fx = hn::IfThenElseZero(any, fx);
-                r.fy = hn::IfThenElseZero(any, fy);
+                r.fx = hn::IfThenElseZero(any, p.at.fx);
+                r.fy = hn::IfThenElseZero(any, p.at.fy);
                 r.uAcross = hn::IfThenElseZero(any, p.uAcross);
                 r.vAcross = hn::IfThenElseZero(any, p.vAcross);
                 r.uDown = hn::IfThenElseZero(any, p.uDown);
                 r.vDown = hn::IfThenElseZero(any, p.vDown);
-                r.offset = offset;
+                r.offset = all.offset;
                 r.gradient = !kUniform || t.uAcross != 0 || t.vDown != 0;
                 addRowOfPoints(s, pixel, bits, r, region);
                 if (kNormals) addNormalsOfRow(s, pixel, bits, r, region);
                 continue;
             }
-            hn::Store(r.w00, d, w00);
-            hn::Store(r.w10, d, w10);
-            hn::Store(r.w01, d, w01);
-            hn::Store(r.w11, d, w11);
-            hn::Store(fx, d, fractionX);
-            hn::Store(fy, d, fractionY);
+            hn::Store(r.w00, d, all.w00);
+            hn::Store(r.w10, d, all.w10);
+            hn::Store(r.w01, d, all.w01);
+            hn::Store(r.w11, d, all.w11);
+            hn::Store(p.at.fx, d, all.fractionX);
+            hn::Store(p.at.fy, d, all.fractionY);
             if (!kUniform) {
-                hn::Store(p.uAcross, d, uAcross);
-                hn::Store(p.vAcross, d, vAcross);
-                hn::Store(p.uDown, d, uDown);
-                hn::Store(p.vDown, d, vDown);
+                hn::Store(p.uAcross, d, all.uAcross);
+                hn::Store(p.vAcross, d, all.vAcross);
+                hn::Store(p.uDown, d, all.uDown);
+                hn::Store(p.vDown, d, all.vDown);
             }
-            forBits(bits, [&](int k) HWY_ATTR {
-                PointColour point = pointColourOf(s, pixel + k, kOpaque);
-                if (uAcross[k] != 0 || vDown[k] != 0)
-                    addGradient(s, pixel + k, uAcross[k], vAcross[k], uDown[k], vDown[k], point);
-                const Four c00 = plus(plus(point.colour, -fractionX[k], point.across),
-                                      -fractionY[k], point.down);
-                const Four c01 = plus(c00, point.down);
-                const std::size_t at = static_cast<std::size_t>(offset[k]);
-                const std::size_t under = at + static_cast<std::size_t>(region.stride);
-                addToPair(region.colour + 4 * at, w00[k], c00, w10[k], plus(c00, point.across));
-                addToPair(region.colour + 4 * under, w01[k], c01, w11[k], plus(c01, point.across));
-                if (!kOpaque) {
-                    region.missing[at] += w00[k] * point.missing;
-                    region.missing[at + 1] += w10[k] * point.missing;
-                    region.missing[under] += w01[k] * point.missing;
-                    region.missing[under + 1] += w11[k] * point.missing;
-                }
-                if (kNormals) {
-                    addToPair(region.normals + 4 * at, w00[k], point.normal, w10[k], point.normal);
-                    addToPair(region.normals + 4 * under, w01[k], point.normal, w11[k],
-                              point.normal);
-                }
-            });
+            forBits(bits,
+                    [&](int k) HWY_ATTR { addSmall<kOpaque, kNormals>(s, pixel, all, k, region); });
         }
     }
 }

@@ -80,6 +80,64 @@ HWY_INLINE hn::Mask<DF> lanesOf(DF d, unsigned halves, int i) {
                    hn::Lt(index, hn::Set(d, halves & 2 ? 2 * kHalf : kHalf)));
 }
 
+// All points of the block are small and share its tilt.
+HWY_INLINE void setUniform(DF d, const BlockTask& t, Splats& out) {
+    out.small = out.at.inside;
+    out.large = hn::Lt(hn::Zero(d), hn::Zero(d));
+    out.slopeX = hn::Set(d, t.slopeX);
+    out.slopeY = hn::Set(d, t.slopeY);
+    out.core2 = hn::Set(d, t.core2);
+    out.quality = hn::Set(d, t.quality * t.density);
+    out.uAcross = hn::Set(d, t.uAcross);
+    out.vAcross = hn::Set(d, t.vAcross);
+    out.uDown = hn::Set(d, t.uDown);
+    out.vDown = hn::Set(d, t.vDown);
+}
+
+// Derivatives of the place in the picture by those in the source.
+struct Jacobian {
+    VF xu, yu, xv, yv;
+};
+
+// Weights and the steps of colours. `linked`: the surface goes on to all sides.
+HWY_INLINE void setColour(DF d, const BlockTask& t, hn::Mask<DF> linked, hn::Mask<DF> seen,
+                          const Jacobian& by, VF det, Splats& out) {
+    const VF one = hn::Set(d, 1.0f);
+    const auto square = [](VF x, VF y) HWY_ATTR { return hn::MulAdd(x, x, hn::Mul(y, y)); };
+    const VF density =
+        hn::Div(one, hn::Max(one, hn::Max(square(by.xu, by.yu), square(by.xv, by.yv))));
+    out.quality = hn::Mul(
+        hn::Mul(hn::Set(d, t.quality), hn::IfThenElse(linked, one, hn::Set(d, kEdgeQuality))),
+        hn::Max(hn::Mul(density, density), hn::Set(d, kLeastDensity)));
+    const VF fade = hn::IfThenElseZero(
+        linked, hn::Min(one, hn::Max(hn::Zero(d),
+                                     hn::MulAdd(det, hn::Set(d, 1 / kFadeTo), hn::Set(d, -1.0f)))));
+    const VF half =
+        hn::Div(hn::Mul(fade, hn::Set(d, 0.5f * kGradient)), hn::IfThenElse(seen, det, one));
+    out.uAcross = hn::Mul(by.yv, half);
+    out.uDown = hn::Neg(hn::Mul(by.xv, half));
+    out.vAcross = hn::Neg(hn::Mul(by.yu, half));
+    out.vDown = hn::Mul(by.xu, half);
+}
+
+// The ellipses of large splats: the lattice's Gaussian carried into the picture, and the low-pass
+// filter added. `reach`: where they end, squared deviations.
+HWY_INLINE void setEllipses(DF d, VF size, const Jacobian& by, float reach, Splats& out) {
+    const auto square = [](VF x, VF y) HWY_ATTR { return hn::MulAdd(x, x, hn::Mul(y, y)); };
+    const VF k = hn::Mul(hn::Mul(size, size), hn::Set(d, kSigmaSource * kSigmaSource));
+    const VF low = hn::Set(d, kSigmaPixel * kSigmaPixel);
+    const VF vxx = hn::MulAdd(k, square(by.xu, by.xv), low);
+    const VF vyy = hn::MulAdd(k, square(by.yu, by.yv), low);
+    const VF vxy = hn::Mul(k, hn::MulAdd(by.xu, by.yu, hn::Mul(by.xv, by.yv)));
+    const VF scale = hn::Div(hn::Set(d, 1.0f), hn::NegMulAdd(vxy, vxy, hn::Mul(vxx, vyy)));
+    out.qxx = hn::Mul(vyy, scale);
+    out.qyy = hn::Mul(vxx, scale);
+    out.qxy = hn::Neg(hn::Mul(vxy, scale));
+    const VF end = hn::Set(d, reach), largest = hn::Set(d, kLargest);
+    out.halfX = hn::Min(hn::Sqrt(hn::Mul(end, vxx)), largest);
+    out.halfY = hn::Min(hn::Sqrt(hn::Mul(end, vyy)), largest);
+}
+
 // kUniform: all points of the block are small and share its tilt. kColour: weights and the steps of
 // colours are wanted.
 template <bool kUniform, bool kColour>
@@ -95,16 +153,7 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
     }
     const VF one = hn::Set(d, 1.0f);
     if (kUniform) {
-        out.small = out.at.inside;
-        out.large = hn::Lt(one, one);
-        out.slopeX = hn::Set(d, t.slopeX);
-        out.slopeY = hn::Set(d, t.slopeY);
-        out.core2 = hn::Set(d, t.core2);
-        out.quality = hn::Set(d, t.quality * t.density);
-        out.uAcross = hn::Set(d, t.uAcross);
-        out.vAcross = hn::Set(d, t.vAcross);
-        out.uDown = hn::Set(d, t.uDown);
-        out.vDown = hn::Set(d, t.vDown);
+        setUniform(d, t, out);
         return out;
     }
     if (!reachesRegion(d, out.at, t.reach, region)) {
@@ -154,36 +203,13 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
     out.slopeX = limited(hn::Mul(hn::Sub(hn::Mul(zu, yv), hn::Mul(zv, yu)), perPixel));
     out.slopeY = limited(hn::Mul(hn::Sub(hn::Mul(zv, xu), hn::Mul(zu, xv)), perPixel));
     if (kColour) {
-        const VF density = hn::Div(one, hn::Max(one, hn::Max(square(xu, yu), square(xv, yv))));
-        out.quality = hn::Mul(
-            hn::Mul(hn::Set(d, t.quality), hn::IfThenElse(linked, one, hn::Set(d, kEdgeQuality))),
-            hn::Max(hn::Mul(density, density), hn::Set(d, kLeastDensity)));
-        const VF fade = hn::IfThenElseZero(
-            linked, hn::Min(one, hn::Max(hn::Zero(d), hn::MulAdd(det, hn::Set(d, 1 / kFadeTo),
-                                                                 hn::Set(d, -1.0f)))));
-        const VF half =
-            hn::Div(hn::Mul(fade, hn::Set(d, 0.5f * kGradient)), hn::IfThenElse(seen, det, one));
-        out.uAcross = hn::Mul(yv, half);
-        out.uDown = hn::Neg(hn::Mul(xv, half));
-        out.vAcross = hn::Neg(hn::Mul(yu, half));
-        out.vDown = hn::Mul(xu, half);
+        setColour(d, t, linked, seen, {xu, yu, xv, yv}, det, out);
     } else {
         out.quality = out.uAcross = out.vAcross = out.uDown = out.vDown = hn::Zero(d);
     }
     if (!hn::AllFalse(d, out.large)) {
-        // The lattice's Gaussian carried into the picture, and the low-pass filter added.
-        const VF k = hn::Mul(hn::Mul(size, size), hn::Set(d, kSigmaSource * kSigmaSource));
-        const VF low = hn::Set(d, kSigmaPixel * kSigmaPixel);
-        const VF vxx = hn::MulAdd(k, square(xu, xv), low), vyy = hn::MulAdd(k, square(yu, yv), low);
-        const VF vxy = hn::Mul(k, hn::MulAdd(xu, yu, hn::Mul(xv, yv)));
-        const VF scale = hn::Div(one, hn::NegMulAdd(vxy, vxy, hn::Mul(vxx, vyy)));
-        out.qxx = hn::Mul(vyy, scale);
-        out.qyy = hn::Mul(vxx, scale);
-        out.qxy = hn::Neg(hn::Mul(vxy, scale));
         // The first pass draws only the core of a splat, which hides what is behind.
-        const VF reach = hn::Set(d, kColour ? kDrawn2 : kCore2), largest = hn::Set(d, kLargest);
-        out.halfX = hn::Min(hn::Sqrt(hn::Mul(reach, vxx)), largest);
-        out.halfY = hn::Min(hn::Sqrt(hn::Mul(reach, vyy)), largest);
+        setEllipses(d, size, {xu, yu, xv, yv}, kColour ? kDrawn2 : kCore2, out);
     }
     return out;
 }
@@ -275,30 +301,8 @@ struct Steps {
 template <bool kColour, class P, class E>
 HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const Region& region,
                          const P& drawPatch, const E& drawEllipse) {
-    enum Value {
-        X,
-        Y,
-        Z,
-        SlopeX,
-        SlopeY,
-        Qxx,
-        Qxy,
-        Qyy,
-        Dx,
-        Dy,
-        Wide,
-        High,
-        Zx,
-        Zy,
-        Qxy2,
-        kShape,
-        Quality = kShape,
-        UAcross,
-        VAcross,
-        UDown,
-        VDown,
-        kValues
-    };
+    enum Value { X, Y, Z, SlopeX, SlopeY, Qxx, Qxy, Qyy, Dx, Dy, Wide, High, Zx, Zy, Qxy2 };
+    enum Colour { kShape = Qxy2 + 1, Quality = kShape, UAcross, VAcross, UDown, VDown, kValues };
     HWY_ALIGN float v[kValues][kBlock];
     HWY_ALIGN std::int32_t box[4][kBlock], element[kBlock];
     const Boxes boxes = boxesOf(d, p.at.x, p.at.y, p.halfX, p.halfY, region);

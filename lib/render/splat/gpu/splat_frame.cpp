@@ -65,6 +65,50 @@ void addLights(const Lighting& settings, const Camera& novel, SplatFrame& frame)
     }
 }
 
+struct Planned {
+    splat::BlockTask task;
+    double density = 0;
+    bool seen = false;
+};
+
+void planBlocks(const splat::PreparedRectangle& info, const splat::RectangleImages& source,
+                const Camera& novel, SplatRule rule, std::vector<Planned>& planned) {
+    planned.assign(info.blocks.size(), {});
+    parallelForBlocks(0, static_cast<std::int64_t>(planned.size()), 512,
+                      [&](std::int64_t from, std::int64_t to) {
+                          for (auto i = from; i < to; ++i) {
+                              Planned& p = planned[i];
+                              p.seen = splat::planBlock(info, info.blocks[i], source, novel,
+                                                        rule == SplatRule::data, p.task);
+                              if (p.seen) p.density = density(info, info.blocks[i], p.task, novel);
+                          }
+                      });
+}
+
+/// The pixels from `begin` to `end` of a block of rectangle `k`, whose images lie at `place`.
+TaskEntry taskEntry(const splat::BlockTask& t, glm::ivec2 begin, glm::ivec2 end, glm::ivec3 place,
+                    std::size_t k) {
+    const auto pair = [](int x, int y) {
+        return static_cast<std::uint32_t>(x) | static_cast<std::uint32_t>(y) << 16;
+    };
+    return {pair(begin.x, begin.y),
+            pair(end.x - begin.x, end.y - begin.y),
+            pair(place.x + begin.x, place.y + begin.y),
+            static_cast<std::uint32_t>(k) | static_cast<std::uint32_t>(place.z) << 20,
+            t.slopeX,
+            t.slopeY,
+            t.core2,
+            t.tolerance,
+            t.quality * (t.uniform ? t.density : 1.0f),
+            t.uAcross,
+            t.vAcross,
+            t.uDown,
+            t.vDown,
+            tileOf(t.x0, t.y0),
+            tileOf(t.x1, t.y1),
+            t.nearest};
+}
+
 }  // namespace
 
 SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
@@ -73,11 +117,6 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
     frame.uniforms = uniformsOf(scene, settings, novel, margin);
     std::vector<TaskEntry> small, large;
     double crowd = 0;  // weights of the points that may meet in one pixel, all views together
-    struct Planned {
-        splat::BlockTask task;
-        double density = 0;
-        bool seen = false;
-    };
     std::vector<Planned> planned;
     for (std::size_t k = 0; k < scene.rectangles.size(); ++k) {
         const splat::PreparedRectangle& info = scene.rectangles[k];
@@ -91,18 +130,7 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
         frame.views.push_back({glm::vec4(m.a0, c.orthographic ? 1.0f : 0.0f), glm::vec4(m.au, c.fx),
                                glm::vec4(m.av, c.fy), glm::vec4(m.b0, 0), glm::vec4(m.bu, 0),
                                glm::vec4(m.bv, 0)});
-        planned.assign(info.blocks.size(), {});
-        parallelForBlocks(0, static_cast<std::int64_t>(planned.size()), 512,
-                          [&](std::int64_t from, std::int64_t to) {
-                              for (auto i = from; i < to; ++i) {
-                                  Planned& p = planned[i];
-                                  p.seen =
-                                      splat::planBlock(info, info.blocks[i], source, novel,
-                                                       settings.splat == SplatRule::data, p.task);
-                                  if (p.seen)
-                                      p.density = density(info, info.blocks[i], p.task, novel);
-                              }
-                          });
+        planBlocks(info, source, novel, settings.splat, planned);
         double densest = 0, heaviest = 0;
         const glm::ivec3 place = scene.places[k];
         for (const Planned& p : planned) {
@@ -113,24 +141,7 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
             heaviest =
                 std::max(heaviest, settings.splat == SplatRule::data ? double(t.quality) : 1.0);
             const auto add = [&](int u0, int v0, int u1, int v1) {
-                const TaskEntry entry{
-                    static_cast<std::uint32_t>(u0) | static_cast<std::uint32_t>(v0) << 16,
-                    static_cast<std::uint32_t>(u1 - u0) | static_cast<std::uint32_t>(v1 - v0) << 16,
-                    static_cast<std::uint32_t>(place.x + u0) |
-                        static_cast<std::uint32_t>(place.y + v0) << 16,
-                    static_cast<std::uint32_t>(k) | static_cast<std::uint32_t>(place.z) << 20,
-                    t.slopeX,
-                    t.slopeY,
-                    t.core2,
-                    t.tolerance,
-                    t.quality * (t.uniform ? t.density : 1.0f),
-                    t.uAcross,
-                    t.vAcross,
-                    t.uDown,
-                    t.vDown,
-                    tileOf(t.x0, t.y0),
-                    tileOf(t.x1, t.y1),
-                    t.nearest};
+                const TaskEntry entry = taskEntry(t, {u0, v0}, {u1, v1}, place, k);
                 const bool own = settings.splat == SplatRule::data && !t.uniform;
                 (!own ? frame.tasks : t.small ? small : large).push_back(entry);
             };

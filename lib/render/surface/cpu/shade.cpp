@@ -60,6 +60,32 @@ HWY_INLINE void findEdges(const Source& source, GroupSource& view, std::int32_t*
     }
 }
 
+/// Lowers the weights of lanes whose colour is near an edge of its source (`edge`, pixels away).
+HWY_INLINE void weighEdges(const std::int32_t* edge, float edgeWeight, GroupSource& out) {
+    const hn::ScalableTag<float> d;
+    using V = hn::Vec<decltype(d)>;
+    const int n = static_cast<int>(hn::Lanes(d));
+    const auto c = [&](float value) { return hn::Set(d, value); };
+    const V one = c(1.0f);
+    const hn::RebindToSigned<decltype(d)> di;
+    out.rough = 0;
+    out.active = false;
+    for (int l = 0; l < kGroup; l += n) {
+        const V away = hn::ConvertTo(d, hn::Load(di, edge + l));
+        const V weight = hn::LoadU(d, &out.weight[l]);
+        const auto on = hn::Gt(weight, hn::Zero(d));
+        const V fade = hn::Min(hn::Mul(away, c(1.0f / kEdgeFade)), one);
+        hn::StoreU(hn::Mul(weight, hn::MulAdd(c(1.0f - edgeWeight), fade, c(edgeWeight))), d,
+                   &out.weight[l]);
+        std::uint8_t bytes[8] = {};
+        hn::StoreMaskBits(d, hn::And(on, hn::Lt(away, c(kEdgeFade))), bytes);
+        std::uint32_t bits = 0;
+        std::memcpy(&bits, bytes, sizeof(bits));
+        out.rough |= (bits & ((1u << n) - 1)) << l;
+        out.active = out.active || !hn::AllFalse(d, on);
+    }
+}
+
 /// Positions, Jacobians and weights of one source for a group.
 HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, std::uint32_t bit,
                       float edgeWeight, GroupSource& out) {
@@ -126,23 +152,7 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
     out.narrow = narrow && s.source->whole;
     alignas(64) std::int32_t edge[kGroup];
     findEdges(*s.source, out, edge);
-    const hn::RebindToSigned<decltype(d)> di;
-    out.rough = 0;
-    out.active = false;
-    for (int l = 0; l < kGroup; l += n) {
-        const V away = hn::ConvertTo(d, hn::Load(di, edge + l));
-        const V weight = hn::LoadU(d, &out.weight[l]);
-        const auto on = hn::Gt(weight, hn::Zero(d));
-        const V fade = hn::Min(hn::Mul(away, c(1.0f / kEdgeFade)), one);
-        hn::StoreU(hn::Mul(weight, hn::MulAdd(c(1.0f - edgeWeight), fade, c(edgeWeight))), d,
-                   &out.weight[l]);
-        std::uint8_t bytes[8] = {};
-        hn::StoreMaskBits(d, hn::And(on, hn::Lt(away, c(kEdgeFade))), bytes);
-        std::uint32_t bits = 0;
-        std::memcpy(&bits, bytes, sizeof(bits));
-        out.rough |= (bits & ((1u << n) - 1)) << l;
-        out.active = out.active || !hn::AllFalse(d, on);
-    }
+    weighEdges(edge, edgeWeight, out);
 }
 
 /// 1 (or alpha) for taps on the surface of the piece, 0 for others, of one lane; taps row by row,

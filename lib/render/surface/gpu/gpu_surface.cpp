@@ -109,10 +109,19 @@ class GpuSurfaceBackend final : public surface::SurfaceBackend {
     [[nodiscard]] Result<GlProgram> build(SurfaceProgram program) const;
     [[nodiscard]] std::vector<TilePlan> planTiles(const SurfaceFrame& work) const;
     [[nodiscard]] std::size_t batchEnd(std::span<TilePlan> plans, std::size_t begin) const;
+    /// Of the samples of a batch.
+    [[nodiscard]] std::int64_t sampleBytes(const Batch& batch) const {
+        return static_cast<std::int64_t>(batch.slots.size()) * kTilePixels * perPixel_ * perPixel_ *
+               4;
+    }
     [[nodiscard]] Batch fillBatch(const SurfaceFrame& work, std::span<const TilePlan> plans) const;
     void uploadSources(const SurfaceFrame& work);
     Result<void> drawNext(Begun& frame, Returned& back);
     Result<void> draw(const SurfaceFrame& work, std::span<const TilePlan> plans, Returned& back);
+    Result<void> upload(const SurfaceFrame& work, const Batch& batch, std::int64_t pixels,
+                        Returned& back);
+    void bind(const SurfaceFrame& work, const Batch& batch);
+    void dispatch(const SurfaceFrame& work, const Batch& batch, std::int64_t pixels);
     Result<void> collect(const SurfaceFrame& work, Returned& back, DrawnFrame out) const;
 
     std::shared_ptr<EglContext> context_;
@@ -270,22 +279,18 @@ void GpuSurfaceBackend::uploadSources(const SurfaceFrame& work) {
     resources_->sources.upload(entries);
 }
 
-Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const TilePlan> plans,
-                                     Returned& back) {
+/// Brings what is drawn of `batch` to the device, and makes room for the answers of `pixels`.
+Result<void> GpuSurfaceBackend::upload(const SurfaceFrame& work, const Batch& batch,
+                                       std::int64_t pixels, Returned& back) {
     Resources& r = *resources_;
-    const Batch batch = fillBatch(work, plans);
     uploadSources(work);
     r.slots.upload(batch.slots);
     r.meshes.upload(batch.meshes);
     r.edges.upload(batch.edges);
     r.tiles.upload(batch.tiles);
     r.locals.upload(batch.locals);
-    const auto tiles = static_cast<std::int64_t>(plans.size());
-    const std::int64_t pixels = tiles * kTilePixels,
-                       most = pixels * perPixel_ * perPixel_ * answers_;
-    const std::int64_t sampleBytes =
-        static_cast<std::int64_t>(batch.slots.size()) * kTilePixels * perPixel_ * perPixel_ * 4;
-    r.samples.reserve(sampleBytes);
+    const std::int64_t most = pixels * perPixel_ * perPixel_ * answers_;
+    r.samples.reserve(sampleBytes(batch));
     r.pieces.reserve(most * kPieceBytes);
     r.pieceColours.reserve(most * 16);
     r.ranges.reserve(pixels * 16);
@@ -298,7 +303,12 @@ Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const T
     if (!back.memory.memory)
         return fail(ErrorCode::failed, "'{}' gives no memory to read the frame back through",
                     context_->device().name);
+    return {};
+}
 
+/// Sets the uniforms, empties the samples and binds what the shaders read and write.
+void GpuSurfaceBackend::bind(const SurfaceFrame& work, const Batch& batch) {
+    Resources& r = *resources_;
     const DepthAxis& axis = work.space.axis;
     const bool bytes = !work.sources[0].source->set->linear();
     const surface::ShadeSettings& shade = work.effort.shade;
@@ -313,8 +323,8 @@ Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const T
                    batch.edges.size())};
     glNamedBufferSubData(r.uniforms.get(), 0, sizeof(uniforms), &uniforms);
     const std::uint32_t zero = 0;
-    glClearNamedBufferSubData(r.samples.buffer.get(), GL_R32UI, 0, sampleBytes, GL_RED_INTEGER,
-                              GL_UNSIGNED_INT, &zero);
+    glClearNamedBufferSubData(r.samples.buffer.get(), GL_R32UI, 0, sampleBytes(batch),
+                              GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
 
     glBindTextureUnit(0, r.scene.surfaces.get());
     glBindTextureUnit(1, r.scene.colours.get());
@@ -327,7 +337,12 @@ Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const T
         r.depth.buffer.get(),   r.origin.buffer.get(),       r.scene.table.get()};
     for (GLuint i = 0; i < storage.size(); ++i)
         glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, storage[i]);
+}
 
+/// Runs the shaders: samples, fused pieces, their colours, pixels.
+void GpuSurfaceBackend::dispatch(const SurfaceFrame& work, const Batch& batch,
+                                 std::int64_t pixels) {
+    Resources& r = *resources_;
     const auto rasterise = [&](const GlProgram& program, const GrowingBuffer& tasks,
                                std::size_t count) {
         if (count == 0) return;
@@ -356,6 +371,16 @@ Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const T
     glUseProgram(work.wantOrigin ? r.resolveWithOrigin.get() : r.resolve.get());
     glDispatchCompute(static_cast<GLuint>(pixels / kShadeGroup), 1, 1);
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+}
+
+Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const TilePlan> plans,
+                                     Returned& back) {
+    const Batch batch = fillBatch(work, plans);
+    const std::int64_t pixels = static_cast<std::int64_t>(plans.size()) * kTilePixels;
+    STX_CHECK(upload(work, batch, pixels, back));
+    bind(work, batch);
+    dispatch(work, batch, pixels);
+    const Resources& r = *resources_;
     const auto fetch = [&](const GrowingBuffer& from, std::int64_t at, std::int64_t each) {
         glCopyNamedBufferSubData(from.buffer.get(), back.memory.buffer.get(), 0, at * pixels,
                                  each * pixels);
