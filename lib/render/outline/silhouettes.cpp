@@ -49,6 +49,16 @@ Image<std::uint8_t> alphaOf(const PageSet& set, std::size_t number) {
     return alpha;
 }
 
+/// The farthest depth of a pixel that has one and of those around it.
+float farthestAround(const Image<float>& depth, int x, int y) {
+    float farthest = depth.at(x, y);
+    for (int v = y - 1; v <= y + 1; ++v)
+        for (int u = x - 1; u <= x + 1; ++u)
+            if (depth.contains(u, v) && hasPoint(depth.at(u, v)))
+                farthest = std::max(farthest, depth.at(u, v));
+    return farthest;
+}
+
 /// What happens between kReach pixels before a row of bytes' element and kReach after it, for all
 /// but the first and last kReach. Without branches, so that compilers make vectors of it.
 template <class F>
@@ -200,19 +210,24 @@ std::uint32_t Silhouettes::freeSamples(const Maps& maps, int x, int y, double de
     return free;
 }
 
-float Silhouettes::coverage(const Camera& camera, const Maps& maps, int x, int y, float depth,
-                            std::size_t& first) const {
+float Silhouettes::coverage(const Camera& camera, const Maps& maps, int x, int y,
+                            const Image<float>& depths, std::size_t& first) const {
     // At a silhouette the surface runs along the ray, so the splat's depth is the least certain
     // thing there is (half a pixel aside is 17 pixels deep on a ball of 300): a ray passes by only
-    // if nothing around that depth is solid for all references.
-    const auto spacing = camera.sampleSpacing(depth);
-    const double pixel = std::max(spacing.x, spacing.y);
+    // if nothing around that depth is solid for all references. Nor around that of what is behind
+    // it, which the pixels beside it show: a splat that sticks out hides the surface behind it.
     std::uint32_t free = kAllSamples;
-    for (const int k : kDepthSteps) {
-        const double at = depth + k * pixel;
-        if (!camera.orthographic && at <= 0) continue;
-        free = freeSamples(maps, x, y, at, free, first);
-        if (free == 0) break;
+    const float here = depths.at(x, y), behind = farthestAround(depths, x, y);
+    const auto spacing = camera.sampleSpacing(here);
+    const double pixel = std::max(spacing.x, spacing.y);
+    for (const float depth : {here, behind}) {
+        for (const int k : kDepthSteps) {
+            const double at = depth + k * pixel;
+            if (!camera.orthographic && at <= 0) continue;
+            free = freeSamples(maps, x, y, at, free, first);
+            if (free == 0) return 1.0f;
+        }
+        if (behind < here + pixel) break;
     }
     return 1.0f - static_cast<float>(std::popcount(free)) / (kSamples * kSamples);
 }
@@ -269,8 +284,7 @@ void Silhouettes::carve(Frame& frame, const Camera& camera, const Extent& drawn)
                 partOf(y), [](float c) { return c == Outlines::kAsked; },
                 [&](int column) {
                     const int x = part.x0 + column;
-                    covered_.at(x, y) =
-                        coverage(camera, maps, x, y, frame.depth.at(x, y), seesPast);
+                    covered_.at(x, y) = coverage(camera, maps, x, y, frame.depth, seesPast);
                 });
     });
     inRows([&](int from, int to) {

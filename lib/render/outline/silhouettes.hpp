@@ -44,8 +44,8 @@ class Silhouettes {
     [[nodiscard]] float alphaBilinear(const View& view, double x, double y) const;
     [[nodiscard]] std::uint32_t freeSamples(const Maps& maps, int x, int y, double depth,
                                             std::uint32_t wanted, std::size_t& first) const;
-    [[nodiscard]] float coverage(const Camera& camera, const Maps& maps, int x, int y, float depth,
-                                 std::size_t& first) const;
+    [[nodiscard]] float coverage(const Camera& camera, const Maps& maps, int x, int y,
+                                 const Image<float>& depths, std::size_t& first) const;
 
     PageSet set_;
     std::optional<Outlines> outlines_;  ///< where some view has a vote

@@ -165,13 +165,6 @@ class MadeViews : public ViewTable {
     const Bundle& bundle_;
 };
 
-Bundle headersOf(const Bundle& bundle) {
-    Bundle headers;
-    for (const ReferenceView& view : bundle.views)
-        static_cast<ViewHeader&>(headers.views.emplace_back()) = view;
-    return headers;
-}
-
 TEST(ViewTable, ThatLiesIsDamage) {
     const Bundle bundle = threeViews(false);
     const TemporaryFolder folder;
