@@ -163,8 +163,8 @@ using PageGroups = std::vector<std::vector<std::vector<std::size_t>>>;
 
 /// Memory of a view of a page beside what its table holds, bytes.
 std::uint64_t memoryOfPageView(const ViewTable& table, std::size_t index) {
-    return std::max(table.bytesToMake(index),
-                    table.bytesOf(index) + peak::kPage.perPixel * table.pixelsOf(index));
+    const std::uint64_t work = peak::kPage.perPixel * table.pixelsOf(index);
+    return table.whole() ? work : std::max(table.bytesToMake(index), table.bytesOf(index) + work);
 }
 
 /// In films all views have atlases of their own, so that what did not change in the next frame is

@@ -37,16 +37,10 @@ class SomeViewsOf : public ViewTable {
 
   private:
     static Bundle headersOf(const ViewTable& all, const std::vector<std::size_t>& numbers) {
-        const Bundle& about = all.about();
-        Bundle headers;
-        headers.title = about.title;
-        headers.origin = about.origin;
-        headers.bounds = about.bounds;
-        headers.environment = about.environment;
-        headers.time = about.time;
-        headers.duration = about.duration;
-        for (const std::size_t i : numbers)
-            static_cast<ViewHeader&>(headers.views.emplace_back()) = about.views[i];
+        Bundle headers = stx::headersOf(all.about());
+        std::vector<ReferenceView> some;
+        for (const std::size_t i : numbers) some.push_back(headers.views[i]);
+        headers.views = std::move(some);
         return headers;
     }
     static std::vector<ViewImageKinds> kindsOf(const ViewTable& all,

@@ -140,14 +140,6 @@ class SequenceWriter {
         ranges_ = std::move(ranges);
         return {};
     }
-    static Bundle headersOf(const Bundle& bundle) {
-        Bundle headers;
-        for (const ReferenceView& view : bundle.views) {
-            headers.views.emplace_back();
-            static_cast<ViewHeader&>(headers.views.back()) = view;
-        }
-        return headers;
-    }
     Result<void> widen(ViewRange& range, const ReferenceView& view, bool first) const {
         if (first) {
             range.normals = view.hasNormals();
