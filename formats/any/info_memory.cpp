@@ -117,7 +117,11 @@ class MemoryOfCommands {
     [[nodiscard]] Takes grouped(const PeakMemory& takes) const {
         const std::uint64_t all = memoryOfAll(table_, takes);
         const bool some = onDemand_ && (!refines_ || spooled_) && all > limits_.maxMemoryBytes;
-        return {some ? limits_.maxMemoryBytes : all, !some};
+        if (!some) return {all, true};
+        std::uint64_t most = limits_.maxMemoryBytes;
+        for (std::size_t i = 0; i < table_.count(); ++i)
+            most = std::max(most, table_.bytesOf(i) + takes.perPixel * table_.pixelsOf(i));
+        return {most, false};
     }
     [[nodiscard]] Takes spooled(const PeakMemory& takes, std::uint64_t inSpool) const {
         const std::uint64_t all = memoryOfAll(table_, takes);

@@ -48,6 +48,7 @@ struct MeshViews {
 
 /// Gives all views these depth bits and the range that suits them; false when all had them.
 bool setDepthBits(Bundle& bundle, int bits);
+/// The same of one view.
 bool setDepthBits(ReferenceView& view, int bits);
 
 /// Notes what 8-bit depth costs, in scene units, when a view has it.

@@ -247,13 +247,14 @@ Result<std::vector<PageImages>> PageScene::add(const Atlas& atlas, Job& job) {
     return pages;
 }
 
-Json PageScene::description() const {
+Json PageScene::description(Json pages) const {
     Json j;
     j["padding"] = padding_;
     j["pruned"] = pruned_;
     j["partial"] = partial_;
     j["views"] = views_;
     j["rectangles"] = rectangles_;
+    j["pages"] = std::move(pages);
     return j;
 }
 

@@ -48,8 +48,8 @@ class PageScene {
     /// without views has none. ColourFile of its views have passed keepExactFiles(). Errors: one
     /// that fails check(), linear colour or depth of 32 bits (invalidInput), memory.
     [[nodiscard]] Result<std::vector<PageImages>> add(const Atlas& atlas, Job& job);
-    /// What the viewer knows beside the numbers of the images, "pages".
-    [[nodiscard]] nlohmann::ordered_json description() const;
+    /// What the viewer knows of them. `pages`: the numbers of the images of each page, by name.
+    [[nodiscard]] nlohmann::ordered_json description(nlohmann::ordered_json pages) const;
 
   private:
     PageColours colours_;

@@ -48,8 +48,9 @@ Result<PageWriter> startPage(const std::filesystem::path& path, const PageOption
 struct PagePoints {
     std::int64_t count = 0;
     Bounds bounds;
-    /// The first view that is not behind the others: how far away what it shows is, scene units,
-    /// and its near plane.
+    bool boundsKnown = false;
+    /// Of a view that is alone with its textures, the first that is not behind the others: how far
+    /// away what it shows is, scene units, and its near plane.
     std::optional<double> distance;
     double nearPlane = 0;
 };
@@ -243,7 +244,7 @@ class PageViews {
 
   private:
     Bundle about_;
-    Bundle bundle_;  ///< all of them in memory, where there is no table
+    Bundle bundle_;  ///< with all images, if table_ is null
     std::unique_ptr<ViewTable> table_;
     PageGroups groups_;
 };
@@ -251,12 +252,12 @@ class PageViews {
 /// Adds what views of the first frame say.
 void look(const Bundle& views, PagePoints& points) {
     points.count += views.pointCount();
-    points.bounds = boundsTogether(std::array{points.bounds, views.computeBounds()});
-    for (const ReferenceView& view : views.views) {
-        if (view.background || points.distance) continue;
-        points.distance = medianDistance(view);
-        points.nearPlane = view.nearPlane;
-    }
+    if (!points.boundsKnown)
+        points.bounds = boundsTogether(std::array{points.bounds, views.computeBounds()});
+    const ReferenceView& first = views.views.front();
+    if (views.views.size() > 1 || first.background || points.distance) return;
+    points.distance = medianDistance(first);
+    points.nearPlane = first.nearPlane;
 }
 
 /// Writes one scene of a frame and gives its number. `points`, if any, is added to.
@@ -279,9 +280,7 @@ Result<int> writeScene(PageWriter& writer, std::size_t slot, PageViews& views,
         STX_CHECK(writer.addImages(slot, k, std::move(images), pages));
     }
     if (pages.empty()) return fail(ErrorCode::invalidInput, "none of the views has a point");
-    Json description = scene.description();
-    description["pages"] = std::move(pages);
-    return writer.addScene(slot, description);
+    return writer.addScene(slot, scene.description(std::move(pages)));
 }
 
 PageReport reportOf(const PageWriter& writer, std::size_t views, std::int64_t points,
@@ -326,6 +325,8 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
         if (!writer) {
             STX_TRY(writer, startPage(path, options, views.about().title, line.moves()));
             count = views.about().views.size();
+            points.boundsKnown = views.about().bounds.has_value();
+            if (points.boundsKnown) points.bounds = *views.about().bounds;
         }
         Json numbers = Json::array();
         for (std::size_t slot = 0; slot < views.groups().size(); ++slot) {
@@ -335,7 +336,6 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
         }
         scenes.push_back(std::move(numbers));
         if (i > 0) continue;
-        if (views.about().bounds) points.bounds = *views.about().bounds;
         STX_TRY(data, dataOf(views.about().views, points, views.about().origin, line, options));
     }
     data["frames"] = std::move(scenes);
@@ -370,9 +370,7 @@ Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::pa
     Json pages = Json::array();
     STX_TRY(auto images, scene.add(atlas, job));
     STX_CHECK(writer.addImages(0, 0, std::move(images), pages));
-    Json description = scene.description();
-    description["pages"] = std::move(pages);
-    STX_TRY(const int number, writer.addScene(0, description));
+    STX_TRY(const int number, writer.addScene(0, scene.description(std::move(pages))));
     data["frames"] = {{number}};
     STX_CHECK(writer.finish(data));
     const auto report = reportOf(writer, atlas.views.size(), points.count, 1);
