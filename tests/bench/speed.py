@@ -9,7 +9,8 @@ A machine's speed is measured by the yardstick: one thread projects points and k
 pixel (yardstick.hpp). It is measured beside each row, and a row's figure is a ratio, so that tables of
 different machines can be compared:
 
-    share    points a second, as a share of the yardstick's                        (more is better)
+    share    points a second, as a share of the yardstick's                        (more is better);
+             "in vectors": of the same loop in vectors on all threads
     points   million points that the yardstick projects in the row's time          (less is better)
     peer     the time of another job, measured in turn with it                     (less is better)
     memory   MB of the process at its largest                                      (less is better)
@@ -43,9 +44,10 @@ def points(seconds):
 class Row:
     """One line of the table. `asked` is the limit of `ratio`, or None for rows that others refer to."""
 
-    def __init__(self, job, kind, ratio, asked=None, wall=None, processor=None, yardstick=None, peer=""):
+    def __init__(self, job, kind, ratio, asked=None, wall=None, processor=None, yardstick=None, peer="", vectors=None):
         self.job, self.kind, self.ratio, self.asked = job, kind, ratio, asked
         self.wall, self.processor, self.yardstick, self.peer = wall, processor, yardstick, peer
+        self.vectors = vectors  # share of the yardstick in vectors on all threads
 
     def holds(self):
         if self.asked is None:
@@ -65,7 +67,7 @@ class Row:
             raise ValueError(f"a row with one of the kinds {', '.join(UNITS)} is expected, not {value!r}")
         if not isinstance(value.get("ratio"), (int, float)) or not value["ratio"] > 0:
             raise ValueError(f"row '{value.get('job')}' has no ratio above 0")
-        known = ("job", "kind", "ratio", "asked", "wall", "processor", "yardstick", "peer")
+        known = ("job", "kind", "ratio", "asked", "wall", "processor", "yardstick", "peer", "vectors")
         return Row(**{k: value[k] for k in known if k in value})
 
 
@@ -92,6 +94,8 @@ def figure(kind, value):
 
 def cells(row):
     unit = f"times {row.peer}" if row.peer else UNITS[row.kind]
+    if row.vectors is not None:
+        unit += f", {row.vectors:.3f} in vectors"
     sign = "≥" if row.kind == "share" else "≤"
     asked = "" if row.asked is None else f"{sign} {figure(row.kind, row.asked)}"
     holds = {None: "", True: "yes", False: "no"}[row.holds()]
@@ -150,7 +154,7 @@ class Measurement:
     def yardstick(self):
         self.ruler.stdin.write("\n")
         self.ruler.stdin.flush()
-        return float(self.ruler.stdout.readline())
+        return float(self.ruler.stdout.readline().split()[0])
 
     def wanted(self, *jobs):
         return any(word in job for job in jobs for word in self.only) if self.only else True
@@ -304,7 +308,8 @@ class Measurement:
             wall = found["milliseconds"] / 1000
             share = found["points"] / wall / 1e6 / found["yardstick"]
             yield Row(names[found["mode"]], "share", share, limits[found["mode"]], wall,
-                      found["processor"] / 1000, found["yardstick"])
+                      found["processor"] / 1000, found["yardstick"],
+                      vectors=found["points"] / wall / 1e6 / found["vectors"])
 
     def frames(self):
         if not self.missing(self.shared / "data/imagesets/spheres-miv", "drawing spheres"):

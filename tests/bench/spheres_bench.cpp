@@ -1,6 +1,6 @@
 // Milliseconds of the median frame of each mode on the processor, frames drawn one after another
-// and not written, and points a second as a share of the yardstick's, which is timed in turn with
-// them.
+// and not written, and points a second as a share of the yardsticks' (yardstick.hpp), which are
+// timed in turn with them.
 //
 //     bench_spheres [--json] [--frames N] [BUNDLE CAMERAS [MODE...]]
 //
@@ -82,7 +82,7 @@ Result<void> measure(const Options& o) {
         settings.quality = mode.quality;
         settings.splat = mode.splat;
         STX_TRY(const auto renderer, makeRenderer(Backend::cpu, bundle, settings, -1, job));
-        std::vector<double> ours, plain;
+        std::vector<double> ours, plain, vectors;
         std::clock_t processor = 0;
         const int warm = std::max(1, o.frames / 10);
         for (int i = 0; i < o.frames + warm; ++i) {
@@ -95,19 +95,25 @@ Result<void> measure(const Options& o) {
             processor += std::clock() - before;
             ours.push_back(time.count());
             plain.push_back(yardstick.draw());
+            vectors.push_back(yardstick.drawInVectors());
         }
         const double milliseconds = median(ours);
         const double speed = points / milliseconds / 1e3;
         const double reached = yardstick.points() / median(plain) / 1e6;
+        const double inVectors = yardstick.points() / median(vectors) / 1e6;
         if (o.json)
             std::printf(
                 "{\"mode\":\"%s\",\"milliseconds\":%.3f,\"processor\":%.3f,\"points\":%.0f,"
-                "\"yardstick\":%.2f}\n",
+                "\"yardstick\":%.2f,\"vectors\":%.2f}\n",
                 mode.word, milliseconds,
-                1e3 * static_cast<double>(processor) / CLOCKS_PER_SEC / o.frames, points, reached);
+                1e3 * static_cast<double>(processor) / CLOCKS_PER_SEC / o.frames, points, reached,
+                inVectors);
         else
-            std::printf("%-15s %7.1f ms %8.1f million points/s, %.2f of the yardstick's %.0f\n",
-                        mode.name, milliseconds, speed, speed / reached, reached);
+            std::printf(
+                "%-15s %7.1f ms %8.1f million points/s, %.2f of the yardstick's %.0f, %.3f "
+                "of the %.0f in vectors on all threads\n",
+                mode.name, milliseconds, speed, speed / reached, reached, speed / inVectors,
+                inVectors);
         std::fflush(stdout);
     }
     return {};

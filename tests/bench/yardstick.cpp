@@ -3,7 +3,9 @@
 #include <chrono>
 #include <cstring>
 #include <limits>
+#include <utility>
 
+#include "lib/base/parallel.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
 
 namespace stx::bench {
@@ -15,10 +17,11 @@ constexpr int kReferences = 4;
 
 Yardstick::Yardstick()
     : bundle_(analyticBundle(AnalyticScene::room, kReferences)),
-      novel_(analyticCamera(AnalyticScene::room, 1.5, kReferences)) {
-    const auto pixels = static_cast<std::size_t>(novel_.width) * novel_.height;
-    nearest_.resize(pixels);
-    picture_.resize(pixels);
+      novel_(analyticCamera(AnalyticScene::room, 1.5, kReferences)) {}
+
+void NearestPoints::clear(std::size_t pixels) {
+    depth.assign(pixels, std::numeric_limits<float>::infinity());
+    colour.resize(pixels);
 }
 
 double Yardstick::points() const {
@@ -27,8 +30,31 @@ double Yardstick::points() const {
 
 double Yardstick::draw() {
     const auto start = std::chrono::steady_clock::now();
-    nearest_.assign(nearest_.size(), std::numeric_limits<float>::infinity());
+    nearest_.clear(static_cast<std::size_t>(novel_.width) * novel_.height);
     for (const auto& view : bundle_.views) splat(view);
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+double Yardstick::drawInVectors() {
+    const auto start = std::chrono::steady_clock::now();
+    const auto pixels = static_cast<std::size_t>(novel_.width) * novel_.height;
+    const auto threads = static_cast<std::size_t>(threadCount());
+    ofThreads_.resize(threads);
+    parallelFor(0, static_cast<std::int64_t>(threads), [&](std::int64_t i) {
+        NearestPoints& own = ofThreads_[static_cast<std::size_t>(i)];
+        own.clear(pixels);
+        for (const auto& view : bundle_.views) {
+            const auto row = [&](std::int64_t n) {
+                return static_cast<int>(view.camera.height * n / static_cast<int>(threads));
+            };
+            splatRows(view, novel_, row(i), row(i + 1), own);
+        }
+    });
+    parallelForBlocks(
+        0, static_cast<std::int64_t>(pixels), 1 << 16, [&](std::int64_t from, std::int64_t to) {
+            keepNearest(ofThreads_, static_cast<std::size_t>(from), static_cast<std::size_t>(to));
+        });
+    std::swap(nearest_, ofThreads_.front());
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
@@ -55,9 +81,10 @@ void Yardstick::splat(const ReferenceView& view) {
             const int i = static_cast<int>(u), j = static_cast<int>(v);
             if (i >= novel_.width || j >= novel_.height) continue;
             const auto at = static_cast<std::size_t>(j) * novel_.width + i;
-            if (depth >= nearest_[at]) continue;
-            nearest_[at] = depth;
-            std::memcpy(&picture_[at], &colours[static_cast<std::size_t>(y) * c.width + x], 4);
+            if (depth >= nearest_.depth[at]) continue;
+            nearest_.depth[at] = depth;
+            std::memcpy(&nearest_.colour[at], &colours[static_cast<std::size_t>(y) * c.width + x],
+                        4);
         }
     }
 }

@@ -22,18 +22,20 @@ struct DrawnTile {
     int tile;
     std::vector<std::vector<float>> samples;
     std::vector<LocalSource> sources;
-    std::vector<std::vector<Squares>> drawnIn;
+    std::vector<std::vector<DrawnBox>> drawnIn;
 
     DrawnTile(const SurfaceFrame& f, int number, const SampleGrid& grid, RasterNeeds needs = {},
               const DrawnTile* middles = nullptr)
         : frame(f), tile(number) {
         for (std::size_t k = 0; k < f.sources.size(); ++k) {
             const FrameSource& s = f.sources[k];
-            const auto blocks = s.blocksOf(tile);
+            std::vector<std::uint32_t> blocks;
+            for (std::size_t i = 0; i < s.blocksOf(tile).size(); ++i)
+                if (!middles || middles->drawnIn[k][i].squaresOf(1, 1) & needs.squares)
+                    blocks.push_back(s.blocksOf(tile)[i]);
             samples.emplace_back(grid.count(), -1.0f);
-            drawnIn.emplace_back(blocks.size(), 0);
+            drawnIn.emplace_back(blocks.size());
             if (grid.apron > 0) needs.drawnIn = drawnIn.back();
-            if (middles) needs.of = middles->drawnIn[k];
             const glm::dmat4 map =
                 f.sampleFromPixel(tile, grid.perPixel, grid.apron) * s.pixelFromSource;
             const bool drawn = rasteriseSource(*s.source, warpFrom(map), blocks, grid, f.space.axis,
@@ -61,12 +63,12 @@ class SettledPixels : public testing::TestWithParam<AnalyticScene> {
 TEST_P(SettledPixels, ShowWhatAllTheirSamplesShow) {
     int settled = 0, all = 0, differing = 0, partial = 0, partialSettled = 0;
     for (int tile = 0; tile < frame.tilesX * frame.tilesY; tile += 3) {
-        const DrawnTile middles(frame, tile, kMiddles, {kAllSquares, true, {}, {}});
+        const DrawnTile middles(frame, tile, kMiddles, {kAllSquares, true, {}});
         const DrawnTile fine(frame, tile, kAll);
         const int x = frame.tileX(tile), y = frame.tileY(tile);
         Pieces few, many;
-        const TilePixels open = fuseSettled(middles.sources, frame.space.axis, x, y, fine.columns(),
-                                            fine.rows(), kPerPixel, few);
+        const TilePixels open = fuseSettled(middles.sources, kMiddles, frame.space.axis, x, y,
+                                            fine.columns(), fine.rows(), kPerPixel, few);
         fuseTile(fine.sources, kAll, frame.space.axis, x, y, fine.columns(), fine.rows(), many);
         struct Shown {
             int pieces = 0;
@@ -124,9 +126,9 @@ TEST_P(SettledPixels, SquaresThatAreAskedForAreDrawnAsTheWholeTileIs) {
     const Squares asked = 0x00'18'3c'00'81'00'ff'01u;
     int compared = 0, differing = 0;
     for (int tile = 0; tile < frame.tilesX * frame.tilesY; tile += 5) {
-        const DrawnTile middles(frame, tile, kMiddles, {kAllSquares, true, {}, {}});
+        const DrawnTile middles(frame, tile, kMiddles, {kAllSquares, true, {}});
         const DrawnTile whole(frame, tile, kAll);
-        const DrawnTile some(frame, tile, kAll, {asked, false, {}, {}}, &middles);
+        const DrawnTile some(frame, tile, kAll, {asked, false, {}}, &middles);
         for (std::size_t k = 0; k < whole.sources.size(); ++k) {
             if (!whole.sources[k].samples) continue;
             for (int y = 0; y < kAll.side(); ++y) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 
 #include "lib/base/cpu_device.hpp"
 #include "lib/base/parallel.hpp"
@@ -29,33 +30,112 @@ Squares squaresOf(const TilePixels& pixels) {
     return squares;
 }
 
-/// Draws tiles, one after another, in memory that is kept from one to the next.
-class TileDrawer {
+/// Tiles along each side of a group. Blocks are drawn once for a group, not once for each tile that
+/// they touch: drawing spot from 16 views takes 0.9 of the time of the processor with two tiles,
+/// 0.87 with four, which leave many threads too few groups to share.
+constexpr int kGroupTiles = 2;
+/// A group of tiles with one sample in the middle of each pixel, and one pixel around it.
+constexpr SampleGrid kGroupMiddles{kMiddles.perPixel, kMiddles.apron, kGroupTiles* kTile};
+
+/// Draws groups of tiles, one after another, in memory that is kept from one to the next.
+class GroupDrawer {
   public:
-    void draw(const SurfaceFrame& frame, int tile, DrawnFrame out) {
+    /// Draws the tiles from this one on, to the right and down.
+    void draw(const SurfaceFrame& frame, int firstTile, DrawnFrame out) {
         frame_ = &frame;
-        tile_ = tile;
-        chosen_ = &frame.sourcesOf(tile);
-        if (std::all_of(chosen_->begin(), chosen_->end(),
-                        [&](int k) { return sourceAt(k).blocksOf(tile).empty(); }))
-            return;
+        firstTile_ = firstTile;
+        listTiles();
+        if (tiles_.empty()) return;
         listSources();
-        listBlocks();
-        makePieces(out.q.width(), out.q.height());
-        shadePieces(pieces_, shade_, rayFrom(frame.space, frame.space), frame.effort.shade,
-                    colours_, best_);
-        addPiecesTo(out);
+        if (frame.effort.settle) drawMiddles();
+        for (const int tile : tiles_) drawTile(tile, out);
     }
 
   private:
+    /// A source of some tiles of the group.
+    struct GroupSource {
+        int number;                      ///< in the frame
+        std::size_t begin = 0, end = 0;  ///< its blocks in facing_
+        bool drawn = false;              ///< something of it shows in the middles of the group
+    };
+
     [[nodiscard]] const FrameSource& sourceAt(int k) const {
         return frame_->sources[static_cast<std::size_t>(k)];
     }
     [[nodiscard]] SampleGrid grid() const { return {frame_->effort.samplesPerPixel}; }
 
+    /// The tiles of the group in which some source may have something.
+    void listTiles() {
+        tiles_.clear();
+        const int x0 = firstTile_ % frame_->tilesX, y0 = firstTile_ / frame_->tilesX;
+        for (int y = y0; y < std::min(y0 + kGroupTiles, frame_->tilesY); ++y) {
+            for (int x = x0; x < std::min(x0 + kGroupTiles, frame_->tilesX); ++x) {
+                const int tile = y * frame_->tilesX + x;
+                if (std::ranges::any_of(frame_->sourcesOf(tile),
+                                        [&](int k) { return !sourceAt(k).blocksOf(tile).empty(); }))
+                    tiles_.push_back(tile);
+            }
+        }
+    }
+
+    /// The sources of the tiles, and those of their blocks that face the camera, in their order in
+    /// the source.
     void listSources() {
-        room_ = std::max(grid().count(), kMiddles.count());
-        samples_.resize(std::max(samples_.size(), room_ * chosen_->size()));
+        sources_.clear();
+        facing_.clear();
+        placeOf_.assign(frame_->sources.size(), -1);
+        for (const int tile : tiles_) {
+            for (const int k : frame_->sourcesOf(tile)) {
+                int& place = placeOf_[static_cast<std::size_t>(k)];
+                if (place >= 0) continue;
+                place = static_cast<int>(sources_.size());
+                sources_.push_back({k});
+            }
+        }
+        for (GroupSource& g : sources_) {
+            const FrameSource& f = sourceAt(g.number);
+            listed_.assign((f.turnedAway.size() + 63) / 64, 0);
+            for (const int tile : tiles_) {
+                if (std::ranges::find(frame_->sourcesOf(tile), g.number) ==
+                    frame_->sourcesOf(tile).end())
+                    continue;
+                for (const std::uint32_t block : f.blocksOf(tile))
+                    if (!f.turnedAway[block]) listed_[block / 64] |= std::uint64_t{1} << block % 64;
+            }
+            g.begin = facing_.size();
+            for (std::size_t word = 0; word < listed_.size(); ++word)
+                for (std::uint64_t left = listed_[word]; left; left &= left - 1)
+                    facing_.push_back(static_cast<std::uint32_t>(word * 64) +
+                                      static_cast<std::uint32_t>(std::countr_zero(left)));
+            g.end = facing_.size();
+        }
+    }
+
+    [[nodiscard]] Warp sampleFromSource(int tile, const SampleGrid& each, int k) const {
+        return warpFrom(frame_->sampleFromPixel(tile, each.perPixel, each.apron) *
+                        sourceAt(k).pixelFromSource);
+    }
+
+    /// Draws the sources into one sample for each pixel of the group.
+    void drawMiddles() {
+        middles_.resize(std::max(middles_.size(), kGroupMiddles.count() * sources_.size()));
+        drawnIn_.assign(facing_.size(), {});
+        for (std::size_t i = 0; i < sources_.size(); ++i) {
+            GroupSource& g = sources_[i];
+            const std::size_t count = g.end - g.begin;
+            g.drawn =
+                count > 0 &&
+                rasteriseSource(*sourceAt(g.number).source,
+                                sampleFromSource(firstTile_, kGroupMiddles, g.number),
+                                {facing_.data() + g.begin, count}, kGroupMiddles,
+                                frame_->space.axis, middles_.data() + kGroupMiddles.count() * i,
+                                {kAllSquares, true, {drawnIn_.data() + g.begin, count}});
+        }
+    }
+
+    void drawTile(int tile, DrawnFrame out) {
+        tile_ = tile;
+        chosen_ = &frame_->sourcesOf(tile);
         local_.clear();
         shade_.clear();
         for (const int k : *chosen_) {
@@ -63,42 +143,46 @@ class TileDrawer {
             local_.push_back({f.source, f.sourceFromPixel, nullptr, f.pixelFromSource});
             shade_.push_back({f.source, f.sourceFromPixel, f.fromEye});
         }
+        makePieces(out.q.width(), out.q.height());
+        shadePieces(pieces_, shade_, rayFrom(frame_->space, frame_->space), frame_->effort.shade,
+                    colours_, best_);
+        addPiecesTo(out);
     }
 
-    void listBlocks() {
-        facing_.clear();
-        facingEnd_.clear();
-        drawnIn_.clear();
-        for (const int k : *chosen_) {
-            const FrameSource& f = sourceAt(k);
-            for (const std::uint32_t block : f.blocksOf(tile_))
-                if (!f.turnedAway[block]) facing_.push_back(block);
-            facingEnd_.push_back(facing_.size());
+    /// Gives each source of the tile its samples in the middles of the group.
+    void takeMiddles() {
+        const int x = frame_->tileX(tile_) - frame_->tileX(firstTile_);
+        const int y = frame_->tileY(tile_) - frame_->tileY(firstTile_);
+        const auto corner = static_cast<std::size_t>(y * kGroupMiddles.stride() + x);
+        for (std::size_t k = 0; k < chosen_->size(); ++k) {
+            const auto place =
+                static_cast<std::size_t>(placeOf_[static_cast<std::size_t>((*chosen_)[k])]);
+            local_[k].samples = sources_[place].drawn
+                                    ? middles_.data() + kGroupMiddles.count() * place + corner
+                                    : nullptr;
         }
     }
 
-    /// Draws each source into its samples.
-    void drawSources(const SampleGrid& each, const RasterNeeds& needs) {
-        const glm::dmat4 sampleFromPixel =
-            frame_->sampleFromPixel(tile_, each.perPixel, each.apron);
-        std::size_t first = 0;
+    /// Draws each source into all samples of these squares of the tile. Of what the middles showed,
+    /// blocks that lie elsewhere are left out.
+    void drawSources(Squares squares) {
+        const std::size_t room = grid().count();
+        samples_.resize(std::max(samples_.size(), room * chosen_->size()));
+        const int x = frame_->tileX(tile_) - frame_->tileX(firstTile_) + kMiddles.apron;
+        const int y = frame_->tileY(tile_) - frame_->tileY(firstTile_) + kMiddles.apron;
         for (std::size_t k = 0; k < chosen_->size(); ++k) {
-            const FrameSource& f = sourceAt((*chosen_)[k]);
-            float* mine = samples_.data() + room_ * k;
-            const std::span<const std::uint32_t> blocks{facing_.data() + first,
-                                                        facingEnd_[k] - first};
-            if (blocks.empty()) continue;
-            RasterNeeds own = needs;
-            if (each.apron > 0) {
-                drawnIn_.resize(facingEnd_[k]);
-                own.drawnIn = {drawnIn_.data() + first, blocks.size()};
-            } else if (!drawnIn_.empty()) {
-                own.of = {drawnIn_.data() + first, blocks.size()};
-            }
-            first = facingEnd_[k];
+            const int number = (*chosen_)[k];
+            const GroupSource& g =
+                sources_[static_cast<std::size_t>(placeOf_[static_cast<std::size_t>(number)])];
+            here_.clear();
+            for (std::size_t i = g.begin; i < g.end; ++i)
+                if (!frame_->effort.settle || drawnIn_[i].squaresOf(x, y) & squares)
+                    here_.push_back(facing_[i]);
+            float* const mine = samples_.data() + room * k;
             const bool drawn =
-                rasteriseSource(*f.source, warpFrom(sampleFromPixel * f.pixelFromSource), blocks,
-                                each, frame_->space.axis, mine, own);
+                !here_.empty() &&
+                rasteriseSource(*sourceAt(number).source, sampleFromSource(tile_, grid(), number),
+                                here_, grid(), frame_->space.axis, mine, {squares});
             local_[k].samples = drawn ? mine : nullptr;
         }
     }
@@ -111,17 +195,16 @@ class TileDrawer {
         const int columns = std::min(kTile, width - tileX), rows = std::min(kTile, height - tileY);
         const int core = frame_->tileCore[static_cast<std::size_t>(tile_)];
         if (!frame_->effort.settle) {
-            drawSources(grid(), {});
+            drawSources(kAllSquares);
             fuseTile(local_, grid(), axis, tileX, tileY, columns, rows, pieces_, nullptr, core);
             return;
         }
-        // One sample for each pixel is drawn first; where it does not settle the pixel, all of
-        // them.
-        drawSources(kMiddles, {kAllSquares, true, {}, {}});
-        const TilePixels open = fuseSettled(local_, axis, tileX, tileY, columns, rows,
-                                            frame_->effort.samplesPerPixel, pieces_);
+        // Where one sample in the middle does not settle a pixel, all of them are drawn.
+        takeMiddles();
+        const TilePixels open = fuseSettled(local_, kGroupMiddles, axis, tileX, tileY, columns,
+                                            rows, frame_->effort.samplesPerPixel, pieces_);
         if (const Squares squares = squaresOf(open)) {
-            drawSources(grid(), {squares, false, {}, {}});
+            drawSources(squares);
             fuseTile(local_, grid(), axis, tileX, tileY, columns, rows, pieces_, &open, core);
         }
     }
@@ -147,15 +230,21 @@ class TileDrawer {
     }
 
     const SurfaceFrame* frame_ = nullptr;
+    int firstTile_ = 0;
+    std::vector<int> tiles_;  ///< of the group
+    std::vector<GroupSource> sources_;
+    std::vector<int> placeOf_;           ///< by source of the frame: where it is in sources_, or -1
+    std::vector<std::uint64_t> listed_;  ///< by block of a source, a bit each
+    std::vector<std::uint32_t> facing_;  ///< blocks that may show, one source after another
+    std::vector<DrawnBox> drawnIn_;      ///< where each of them was drawn
+    std::vector<float> middles_;         ///< of each source in turn
+
     int tile_ = 0;
     const std::vector<int>* chosen_ = nullptr;  ///< the tile's sources, the best first
-    std::size_t room_ = 0;                      ///< samples of a source
-    std::vector<float> samples_;
+    std::vector<std::uint32_t> here_;           ///< blocks of a source
+    std::vector<float> samples_;                ///< of each source in turn
     std::vector<LocalSource> local_;
     std::vector<ShadeSource> shade_;
-    std::vector<std::uint32_t> facing_;   ///< blocks that may show, one source after another
-    std::vector<std::size_t> facingEnd_;  ///< of each source
-    std::vector<Squares> drawnIn_;        ///< where each block was drawn
     Pieces pieces_;
     std::vector<glm::vec3> colours_;  ///< of each piece
     std::vector<std::int8_t> best_;   ///< the source that a piece shows most of, or -1
@@ -171,13 +260,16 @@ class CpuSurfaceBackend final : public SurfaceBackend {
         return {};
     }
     Result<void> finish(DrawnFrame out) override {
-        parallelFor(0, static_cast<std::int64_t>(frame_->tilesX) * frame_->tilesY,
-                    [&](std::int64_t tile) {
-                        if (job_.cancelled || frame_->sources.empty()) return;
-                        static thread_local TileDrawer drawer;
-                        drawer.draw(*frame_, static_cast<int>(tile), out);
-                        frame_->sources.front().source->set->settle();
-                    });
+        const int columns = (frame_->tilesX + kGroupTiles - 1) / kGroupTiles;
+        const int rows = (frame_->tilesY + kGroupTiles - 1) / kGroupTiles;
+        parallelFor(0, static_cast<std::int64_t>(columns) * rows, [&](std::int64_t group) {
+            if (job_.cancelled || frame_->sources.empty()) return;
+            static thread_local GroupDrawer drawer;
+            const int column = static_cast<int>(group) % columns;
+            const int row = static_cast<int>(group) / columns;
+            drawer.draw(*frame_, kGroupTiles * (row * frame_->tilesX + column), out);
+            frame_->sources.front().source->set->settle();
+        });
         return {};
     }
     void drop() override {}

@@ -236,12 +236,13 @@ void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, cons
     }
 }
 
-TilePixels fuseSettled(std::span<const LocalSource> sources, const DepthAxis& axis, int tileX,
-                       int tileY, int columns, int rows, int perPixel, Pieces& pieces) {
+TilePixels fuseSettled(std::span<const LocalSource> sources, const SampleGrid& grid,
+                       const DepthAxis& axis, int tileX, int tileY, int columns, int rows,
+                       int perPixel, Pieces& pieces) {
     static thread_local TileMiddles middles;
     // The first pixel of its rows belongs to the apron.
-    shared::Fuser fuser(sources, kMiddles, axis, tileX - kMiddles.apron, tileY - kMiddles.apron);
-    settlePixels(sources, axis, fuser.tile.step, perPixel, middles);
+    shared::Fuser fuser(sources, grid, axis, tileX - kMiddles.apron, tileY - kMiddles.apron);
+    settlePixels(sources, grid.stride(), axis, fuser.tile.step, perPixel, middles);
     const std::uint32_t inside = columns == kTile ? ~0u : (1u << columns) - 1;
     TilePixels open{};
     std::size_t next = pieces.size(), most = next;

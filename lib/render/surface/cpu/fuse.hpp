@@ -38,11 +38,11 @@ void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, cons
               int tileX, int tileY, int columns, int rows, Pieces& pieces,
               const TilePixels* wanted = nullptr, int core = kMostTileSources);
 
-/// Adds the pieces of the pixels that one sample in their middle settles (see settlePixels());
-/// `sources` have samples of kMiddles. Returns the other pixels, where that does not tell; those
-/// would get `perPixel` samples a side.
-[[nodiscard]] TilePixels fuseSettled(std::span<const LocalSource> sources, const DepthAxis& axis,
-                                     int tileX, int tileY, int columns, int rows, int perPixel,
-                                     Pieces& pieces);
+/// Adds the pieces of the pixels that one sample in their middle settles; `sources` have samples
+/// of such a grid, the tile's first pixel after the apron (see settlePixels()). Returns the other
+/// pixels, where that does not tell; those would get `perPixel` samples a side.
+[[nodiscard]] TilePixels fuseSettled(std::span<const LocalSource> sources, const SampleGrid& grid,
+                                     const DepthAxis& axis, int tileX, int tileY, int columns,
+                                     int rows, int perPixel, Pieces& pieces);
 
 }  // namespace stx::surface

@@ -66,10 +66,7 @@ struct Target {
         const auto square = [&](float at) {
             return std::min(static_cast<int>(at * squaresPerSample), 7);
         };
-        const int left = square(x0), right = square(x1), top = square(y0), bottom = square(y1);
-        const Squares columns = (Squares{2} << right) - (Squares{1} << left);
-        const Squares rows = (kAllSquares << (8 * top)) & (kAllSquares >> (56 - 8 * bottom));
-        return rows & (columns * 0x0101010101010101u);
+        return squaresBetween(square(x0), square(y0), square(x1), square(y1));
     }
 };
 

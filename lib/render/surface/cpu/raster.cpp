@@ -311,21 +311,10 @@ HWY_NOINLINE void drawExtensions(Target& t, const Source& s, const Warp& warp,
     if (count) flush();
 }
 
-/// The squares of a tile that what was drawn with kMiddles may be in, a pixel around included.
-HWY_INLINE Squares squaresAround(const Target& t, const Extent& extent) {
+HWY_INLINE DrawnBox boxOf(const Extent& extent) {
     const FloatTag d;
-    const float x0 = hn::GetLane(hn::MinOfLanes(d, extent.x0));
-    const float y0 = hn::GetLane(hn::MinOfLanes(d, extent.y0));
-    const float x1 = hn::GetLane(hn::MaxOfLanes(d, extent.x1));
-    const float y1 = hn::GetLane(hn::MaxOfLanes(d, extent.y1));
-    if (!(x0 <= x1 && y0 <= y1)) return 0;
-    // Turns indices of samples, which begin in the apron, into pixels of the tile, and adds one
-    // pixel on each side.
-    const auto clamped = [](float at) {
-        return std::clamp(at, 0.0f, static_cast<float>(kTile - 1));
-    };
-    return t.squaresFrom(clamped(x0 - 1.6f), clamped(y0 - 1.6f), clamped(x1 + 0.6f),
-                         clamped(y1 + 0.6f));
+    return {hn::GetLane(hn::MinOfLanes(d, extent.x0)), hn::GetLane(hn::MinOfLanes(d, extent.y0)),
+            hn::GetLane(hn::MaxOfLanes(d, extent.x1)), hn::GetLane(hn::MaxOfLanes(d, extent.y1))};
 }
 
 bool RasteriseSource(const Source& s, const Warp& warp, std::span<const std::uint32_t> blocks,
@@ -347,11 +336,7 @@ bool RasteriseSource(const Source& s, const Warp& warp, std::span<const std::uin
                           static_cast<int>(index / s.blocksX)) *
                kBlock;
     };
-    const auto wanted = [&](std::size_t k) {
-        return needs.of.empty() || (needs.of[k] & needs.squares) != 0;
-    };
     for (std::size_t k = 0; k < blocks.size(); ++k) {
-        if (!wanted(k)) continue;
         const SourceBlock& block = s.blocks[blocks[k]];
         Extent extent;
         drawLeaves(t, warp, {s.leaves.data() + block.leafBegin, s.leaves.data() + block.leafEnd},
@@ -367,15 +352,15 @@ bool RasteriseSource(const Source& s, const Warp& warp, std::span<const std::uin
             drawCells(t, s, warp, block, blockTexels(s, at.x, at.y, buffer), at.x, at.y, ahead,
                       extent);
         }
-        if (!needs.drawnIn.empty()) needs.drawnIn[k] = squaresAround(t, extent);
+        if (!needs.drawnIn.empty()) needs.drawnIn[k] = boxOf(extent);
     }
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         const SourceBlock& block = s.blocks[blocks[k]];
-        if (!block.anyEdge || !wanted(k)) continue;
+        if (!block.anyEdge) continue;
         const glm::ivec2 at = corner(blocks[k]);
         Extent extent;
         drawExtensions(t, s, warp, block, blockTexels(s, at.x, at.y, buffer), at.x, at.y, extent);
-        if (!needs.drawnIn.empty()) needs.drawnIn[k] |= squaresAround(t, extent);
+        if (!needs.drawnIn.empty()) needs.drawnIn[k].add(boxOf(extent));
     }
     return !t.empty;
 }
@@ -385,6 +370,20 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace stx::surface {
+
+Squares DrawnBox::squaresOf(int x, int y) const {
+    if (empty()) return 0;
+    const auto left = static_cast<float>(x), top = static_cast<float>(y);
+    constexpr float kLast = kTile - 1;
+    // From samples to pixels of the tile, with one pixel on each side.
+    const float from = x0 - left - 0.6f, to = x1 - left + 1.6f;
+    const float above = y0 - top - 0.6f, below = y1 - top + 1.6f;
+    if (to < 0 || below < 0 || from > kLast || above > kLast) return 0;
+    const auto square = [&](float at) {
+        return static_cast<int>(std::clamp(at, 0.0f, kLast)) / kSquare;
+    };
+    return squaresBetween(square(from), square(above), square(to), square(below));
+}
 
 HWY_EXPORT(RasteriseSource);
 

@@ -26,6 +26,7 @@ HWY_INLINE V slopeFrom(D d, V here, V before, V after, V limit) {
 
 struct Settler {
     std::span<const LocalSource> sources;
+    int stride;
     const DepthAxis& axis;
     float step;
     int perPixel;
@@ -89,7 +90,6 @@ struct Settler {
             s.count = hn::IfThenZeroElse(nearer, s.count);
             s.front = hn::IfThenElse(nearer, q, s.front);
             if (inside) {
-                const int stride = kMiddles.stride();
                 const V limit = hn::Mul(hn::Set(d, kLinkedSamples), scaleOf(d, q));
                 const V sx = slopeFrom(d, q, hn::LoadU(d, at - 1), hn::LoadU(d, at + 1), limit);
                 const V sy =
@@ -148,7 +148,7 @@ struct Settler {
         const bool inside = row > 0 && row <= kTile;
         const auto r = static_cast<std::size_t>(row);
         for (int x = 0; x < kMiddlesSide; x += static_cast<int>(hn::Lanes(d))) {
-            const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(row) * kMiddles.stride() + x;
+            const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(row) * stride + x;
             Summary s{zero, zero, zero, zero, zero, zero, none, none, none};
             for (std::size_t k = 0; k < sources.size(); ++k)
                 if (sources[k].samples) addSource(k, sources[k].samples + at, inside, s);
@@ -205,9 +205,9 @@ struct Settler {
     }
 };
 
-void SettlePixels(std::span<const LocalSource> sources, const DepthAxis& axis, float step,
-                  int perPixel, TileMiddles& out) {
-    const Settler settler{sources, axis, step, perPixel, out};
+void SettlePixels(std::span<const LocalSource> sources, int stride, const DepthAxis& axis,
+                  float step, int perPixel, TileMiddles& out) {
+    const Settler settler{sources, stride, axis, step, perPixel, out};
     for (int row = 0; row < kMiddlesSide; ++row) settler.summariseRow(row);
     for (int y = 0; y < kTile; ++y) settler.settleRow(y);
 }
@@ -220,9 +220,9 @@ namespace stx::surface {
 
 HWY_EXPORT(SettlePixels);
 
-void settlePixels(std::span<const LocalSource> sources, const DepthAxis& axis, float step,
-                  int perPixel, TileMiddles& out) {
-    HWY_DYNAMIC_DISPATCH(SettlePixels)(sources, axis, step, perPixel, out);
+void settlePixels(std::span<const LocalSource> sources, int stride, const DepthAxis& axis,
+                  float step, int perPixel, TileMiddles& out) {
+    HWY_DYNAMIC_DISPATCH(SettlePixels)(sources, stride, axis, step, perPixel, out);
 }
 
 }  // namespace stx::surface

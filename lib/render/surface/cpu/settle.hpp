@@ -32,9 +32,10 @@ struct TileMiddles {
 
 /// Finds the pixels of a tile that need no more samples than the one in their middle: they and the
 /// pixels around them are simple (see shaders/shared/surface_fuse.glsl) and on one surface, or
-/// nothing is in them nor around. `sources` have samples of kMiddles, drawn with
-/// RasterNeeds::reachFromEdges; other pixels would get `perPixel` samples a side.
-void settlePixels(std::span<const LocalSource> sources, const DepthAxis& axis, float step,
-                  int perPixel, TileMiddles& out);
+/// nothing is in them nor around. `sources` have one sample a pixel, drawn with
+/// RasterNeeds::reachFromEdges, the tile's first pixel after an apron of one; rows are `stride`
+/// apart. Other pixels would get `perPixel` samples a side.
+void settlePixels(std::span<const LocalSource> sources, int stride, const DepthAxis& axis,
+                  float step, int perPixel, TileMiddles& out);
 
 }  // namespace stx::surface
