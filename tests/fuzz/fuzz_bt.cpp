@@ -14,8 +14,13 @@
 using namespace stx;
 using namespace stx::mpeg4;
 
-/// Whether a name may have a character that is written as '_': names in buffers are bytes of these.
+/// Whether a name may have a character that is written as '_', or begins as a number does and gets
+/// a '_' before it: names in buffers are bytes of these.
 static bool mayRename(std::string_view text) {
+    for (auto at = text.find("DEF"); at != text.npos; at = text.find("DEF", at + 3)) {
+        const auto name = text.find_first_not_of(" \t\r\n,", at + 3);
+        if (name != text.npos && std::strchr("+-0123456789", text[name])) return true;
+    }
     return std::ranges::any_of(text, [](char c) {
         return std::ispunct(static_cast<unsigned char>(c)) ? !std::strchr("_-+.,#\"'{}[]", c)
                                                            : std::iscntrl(c) && !std::isspace(c);
