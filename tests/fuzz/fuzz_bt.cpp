@@ -22,8 +22,9 @@ static bool mayRename(std::string_view text) {
         if (name != text.npos && std::strchr("+-0123456789", text[name])) return true;
     }
     return std::ranges::any_of(text, [](char c) {
-        return std::ispunct(static_cast<unsigned char>(c)) ? !std::strchr("_-+.,#\"'{}[]", c)
-                                                           : std::iscntrl(c) && !std::isspace(c);
+        return std::ispunct(static_cast<unsigned char>(c))
+                   ? !std::strchr("_-+.,#\"'{}[]", c)
+                   : std::iscntrl(static_cast<unsigned char>(c)) && !std::strchr("\t\r\n", c);
     });
 }
 
