@@ -103,10 +103,10 @@ CONSTANT float kLeastArea = 1e-16f;
 // Pixels this far from an edge count in full, those on it and on creases kEdgeWeight, unless
 // views disagree (ShadeSettings::edgeWeight).
 CONSTANT float kEdgeFade = 3.0f, kEdgeWeight = 0.05f;
-// Near edges, a tap on an edge inside the object or on a crease mixes the colours of two surfaces: it counts this share
-// of the taps beside it. Of 177 random cases 0.3, 0.15 and 0.07 raise the mean by 0.026, 0.034 and 0.038 dB, and cost a box
-// at most 0.7, 1.2 and 1.7; on outlines beside background, too: 0.04 less (44 cases),
-// for there alpha tells the colours apart.
+// In pruned views and others with unknown depth, near edges, a tap on an edge inside the object or on a crease mixes the
+// colours of two surfaces: it counts this share of the taps beside it, since few others outweigh it. With kSpreadRidge
+// two pruned rooms rise from 38.9 and 43.6 to 48.9 and 52.8 dB. In all views it raises the mean of 177 random cases by
+// 0.03 dB, but takes spheres-miv from over 50.10 to 50.08 dB at `best`, and 1 dB from single boxes.
 CONSTANT float kMixedTap = 0.2f;
 // Where taps lie far apart in the frame, what holds the quadratic terms down (ShadeSettings::ridge) grows with the
 // square of how far, by this share: else one tap that is off bends the colours between the others. 0.2 raises the mean of 177

@@ -4,7 +4,7 @@
 // Needs surface_votes.glsl. From outside: FrameEntry frame; SourceEntry sources[]; MOST, sources
 // that a piece takes colours from; int sourceOf(k), source k of the piece's tile; in a place
 //   float ownColourOf(s, place, i, j), how far from edges, 0 on creases, bool mixesColours(s, place, i, j), whether
-//   two surfaces have a part in the colour, and vec4 colourOf(s, place, i, j)
+//   two surfaces have a part in the colour, of sources that lack points, and vec4 colourOf(s, place, i, j)
 // Taps tapPlaceOf(s, corner), a Place of 4x4 pixels around a point, and bool canRead(place, pixel) which of
 // them are there
 

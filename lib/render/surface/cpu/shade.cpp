@@ -475,10 +475,13 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
     if (t.count > settings.mostSources) keepHeaviest(g, settings.mostSources, t);
 
     Lanes moments[kMoments] = {};
-    const float mixed = std::max(kMixedTap, settings.edgeWeight);
     for (int k = 0; k < t.count; ++k) {
         const int s = t.list[k];
-        findTaps(g, sources[static_cast<std::size_t>(s)], s, mixed, t);
+        const ShadeSource& source = sources[static_cast<std::size_t>(s)];
+        const float mixed = source.source->view->depthMayBeUnknown()
+                                ? std::max(kMixedTap, settings.edgeWeight)
+                                : 1.0f;
+        findTaps(g, source, s, mixed, t);
         if (t.views[s].narrow)
             addMoments<kNarrow>(s, settings.kernel, t, moments);
         else
