@@ -103,6 +103,16 @@ CONSTANT float kLeastArea = 1e-16f;
 // Pixels this far from an edge count in full, those on it and on creases kEdgeWeight, unless
 // views disagree (ShadeSettings::edgeWeight).
 CONSTANT float kEdgeFade = 3.0f, kEdgeWeight = 0.05f;
+// In pruned views and others with unknown depth, near edges, a tap on an edge inside the object or on a crease mixes the
+// colours of two surfaces: it counts this share of the taps beside it, since few others outweigh it. With kSpreadRidge
+// two pruned rooms rise from 38.9 and 43.6 to 48.9 and 52.8 dB. In all views it raises the mean of 177 random cases by
+// 0.03 dB, but takes spheres-miv from over 50.10 to 50.08 dB at `best`, and 1 dB from single boxes.
+CONSTANT float kMixedTap = 0.2f;
+// Where taps lie far apart in the frame, what holds the quadratic terms down (ShadeSettings::ridge) grows with the
+// square of how far, by this share: else one tap that is off bends the colours between the others. 0.2 raises the mean of 177
+// random cases by 0.10 dB, of those with texels of more than 4 pixels by 0.31; with kMixedTap 0.1, 0.2 and 0.5 raise it by
+// 0.132, 0.136 and 0.135; of 44 cases 4 and 20 cost fine textures 0.1 and 0.2.
+CONSTANT float kSpreadRidge = 0.2f;
 // Taps farther than kNarrowReach pixels from the position in a source count nothing where no step of a
 // pixel in the frame moves that position by more than the root of kNarrowStep pixels along either axis: the
 // kernel has fallen to 1/400 there.

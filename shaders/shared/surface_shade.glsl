@@ -3,7 +3,8 @@
 // does the same with vectors in lib/render/surface/cpu/shade.cpp; a test holds both against this.
 // Needs surface_votes.glsl. From outside: FrameEntry frame; SourceEntry sources[]; MOST, sources
 // that a piece takes colours from; int sourceOf(k), source k of the piece's tile; in a place
-//   float ownColourOf(s, place, i, j), how far from edges, 0 on creases, and vec4 colourOf(s, place, i, j)
+//   float ownColourOf(s, place, i, j), how far from edges, 0 on creases, bool mixesColours(s, place, i, j), whether
+//   two surfaces have a part in the colour, of sources that lack points, and vec4 colourOf(s, place, i, j)
 // Taps tapPlaceOf(s, corner), a Place of 4x4 pixels around a point, and bool canRead(place, pixel) which of
 // them are there
 
@@ -62,7 +63,7 @@ SourceView viewOf(int s, Piece piece) {
 // The first of the 4x4 taps around a position.
 ivec2 firstTap(SourceView view) { return ivec2(floor(view.at - 1.5f)); }
 
-// Which taps are on the surface of the piece, bit row * 4 + column.
+// Which taps are on the surface of the piece, bit row * 4 + column, and 16 bits above which mix its colours with others.
 uint tapsOnSurface(int s, Piece piece, SourceView view) {
     vec4 mq = sources[s].warpQ, mw = sources[s].warpW;
     float inverse = 1.0f / rowAt(mw, piece.x, piece.y, piece.q);
@@ -83,10 +84,14 @@ uint tapsOnSurface(int s, Piece piece, SourceView view) {
         float there = qAt(s, place, k % 4, k / 4);
         float du = float(c.x) + 0.5f - view.at.x, dv = float(c.y) + 0.5f - view.at.y;
         float predicted = p + clamp(pu * du + pv * dv, -kFarthestTap * all, kFarthestTap * all);
-        if (there > 0.0f && !(abs(there - predicted) > allowed)) taps |= 1u << k;
+        if (!(there > 0.0f) || abs(there - predicted) > allowed) continue;
+        taps |= (mixesColours(s, place, k % 4, k / 4) ? 0x10001u : 1u) << k;
     }
     return taps;
 }
+
+// What tap t counts, of those that tapsOnSurface() gave.
+float shareOf(uint taps, int t) { return (taps >> (16 + t) & 1u) != 0u ? max(kMixedTap, frame.fit.w) : 1.0f; }
 
 // r² = x dx² + y dx dy + z dy² of offsets in the frame, 1 where the kernel ends. Its size is that of a
 // pixel of the frame, and by a share of kOwn that of a pixel of the source as the frame has it. The larger
@@ -126,14 +131,19 @@ void solveFirstRow(INOUT_ARRAY(float, m, 15), OUT_ARRAY(float, row, 6)) {
     const int index[25] = {3, 4, 6,  7, 8,  4,  5, 7, 8,  9,  6, 7, 10,
                            11, 12, 7, 8, 11, 12, 13, 8, 9, 12, 13, 14};
     float hold = m[0] * frame.fit.y;
+    // How far taps spread: the mean square of their distance, 1 where they lie as close as the kernel allows, close to
+    // a Gaussian of a sixteenth of its squared radius.
+    float spread = max(8.0f * (m[3] + m[5]) / (m[0] * frame.fit.x), 1.0f);
+    float holdSquares = hold * (1.0f + kSpreadRidge * (spread * spread - 1.0f));
     float lower[25], inverse[5], z[5], y[5];
     for (int i = 0; i < 5; ++i) {
         for (int j = 0; j <= i; ++j) {
             float sum = m[index[i * 5 + j]];
-            if (i == j) sum += hold;
+            float held = i < 2 ? hold : holdSquares;
+            if (i == j) sum += held;
             for (int k = 0; k < j; ++k) sum -= lower[i * 5 + k] * lower[j * 5 + k] * z[k];
             if (i == j) {
-                z[i] = max(sum, hold * 0.01f);
+                z[i] = max(sum, held * 0.01f);
                 inverse[i] = 1.0f / z[i];
             } else {
                 lower[i * 5 + j] = sum * inverse[j];
@@ -198,7 +208,7 @@ vec4 shadePiece(Piece piece) {
         for (int t = 0; t < 16; ++t) {
             if ((taps[k] >> t & 1u) == 0u) continue;
             Tap tap = tapOf(view, metric, base + ivec2(t % 4, t / 4));
-            float dx = tap.dx, dy = tap.dy, w = tap.weight;
+            float dx = tap.dx, dy = tap.dy, w = tap.weight * shareOf(taps[k], t);
             if (weigh) w *= alphaOf(top[k], place, t % 4, t / 4);
             float wx = w * dx, wy = w * dy, wxx = wx * dx, wyy = wy * dy;
             float xx = dx * dx, xy = dx * dy, yy = dy * dy;
@@ -238,7 +248,7 @@ vec4 shadePiece(Piece piece) {
             Tap tap = tapOf(view, metric, base + ivec2(t % 4, t / 4));
             float dx = tap.dx, dy = tap.dy;
             vec4 texel = colourOf(top[k], place, t % 4, t / 4);
-            float w = tap.weight * (weigh ? texel.w : 1.0f);
+            float w = tap.weight * shareOf(taps[k], t) * (weigh ? texel.w : 1.0f);
             w *= row[0] + row[1] * dx + row[2] * dy + dx * (row[3] * dx + row[4] * dy) + row[5] * dy * dy;
             sum += w * vec3(texel);
             total += w;

@@ -196,11 +196,17 @@ struct Taps {
 };
 
 /// The first row of the inverse of the 6x6 normal matrix, terms 1, dx, dy, dx², dxdy, dy².
+/// `kernel`: the squared radius of the fit.
 template <class D, class V = hn::Vec<D>>
-HWY_INLINE void solveFirstRow(D d, const V* m, V ridge, V* out) {
+HWY_INLINE void solveFirstRow(D d, const V* m, float kernel, float ridge, V* out) {
     // Moments by power: 0:1 1:x 2:y 3:xx 4:xy 5:yy 6:xxx 7:xxy 8:xyy 9:yyy 10:x4 11:x3y 12:x2y2
     // 13:xy3 14:y4
-    const V hold = hn::Mul(m[0], ridge);
+    const V hold = hn::Mul(m[0], hn::Set(d, ridge)), one = hn::Set(d, 1.0f);
+    // See surface_shade.glsl.
+    const V squares = hn::Mul(hn::Add(m[3], m[5]), hn::Set(d, 8.0f / kernel));
+    const V spread = hn::Max(hn::Div(squares, m[0]), one);
+    const V more = hn::MulAdd(hn::Set(d, kSpreadRidge), hn::MulSub(spread, spread, one), one);
+    const V holdSquares = hn::Mul(hold, more);
     constexpr int kIndex[5][5] = {{3, 4, 6, 7, 8},
                                   {4, 5, 7, 8, 9},
                                   {6, 7, 10, 11, 12},
@@ -210,11 +216,12 @@ HWY_INLINE void solveFirstRow(D d, const V* m, V ridge, V* out) {
     for (int i = 0; i < 5; ++i) {
         for (int j = 0; j <= i; ++j) {
             V sum = m[kIndex[i][j]];
-            if (i == j) sum = hn::Add(sum, hold);
+            const V held = i < 2 ? hold : holdSquares;
+            if (i == j) sum = hn::Add(sum, held);
             for (int k = 0; k < j; ++k)
                 sum = hn::NegMulAdd(lower[i][k], hn::Mul(lower[j][k], z[k]), sum);
             if (i == j) {
-                z[i] = hn::Max(sum, hn::Mul(hold, hn::Set(d, 0.01f)));
+                z[i] = hn::Max(sum, hn::Mul(held, hn::Set(d, 0.01f)));
                 inverse[i] = hn::Div(hn::Set(d, 1.0f), z[i]);
             } else {
                 lower[i][j] = hn::Mul(sum, inverse[j]);

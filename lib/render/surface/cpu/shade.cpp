@@ -155,10 +155,12 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
     weighEdges(edge, edgeWeight, out);
 }
 
-/// 1 (or alpha) for taps on the surface of the piece, 0 for others, of one lane; taps row by row,
-/// `out` aligned to a row.
+/// 1 (or alpha) for taps on the surface of the piece, less where they mix its colours with others,
+/// 0 for taps elsewhere, of one lane; taps row by row, `out` aligned to a row. `mixed`: see
+/// kMixedTap.
 HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u, float v,
-                         const GroupSource& view, int baseU, int baseV, float out[kTaps * kTaps]) {
+                         const GroupSource& view, int baseU, int baseV, float mixed,
+                         float out[kTaps * kTaps]) {
     const Source& source = *s.source;
     const auto& m = s.sourceFromPixel.m;
     const float x = g.x[lane], y = g.y[lane], q = g.q[lane];
@@ -182,6 +184,7 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
         const hn::FixedTag<float, kTaps> d;
         const hn::RebindToSigned<decltype(d)> di;
         const auto far = hn::Set(d, kFarthestTap * scale), limit = hn::Set(d, allowed);
+        const std::uint8_t* texels = taps.page->info.data();
         const auto du = hn::Add(hn::ConvertTo(d, hn::Iota(di, 0)),
                                 hn::Set(d, static_cast<float>(baseU) + 0.5f - u));
         for (int j = 0; j < kTaps; ++j) {
@@ -201,6 +204,13 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
                 const auto alpha = hn::BitCast(di, hn::ShiftRight<24>(colours));
                 value = hn::Mul(hn::ConvertTo(d, alpha), hn::Set(d, 1.0f / 255.0f));
             }
+            const auto info = hn::PromoteTo(
+                di, hn::LoadU(hn::Rebind<std::uint8_t, decltype(d)>(), texels + texel));
+            const auto mixes =
+                hn::Or(hn::TestBit(info, hn::Set(di, Info::kCrease)),
+                       hn::Eq(hn::And(info, hn::Set(di, Info::kAwayFromInnerEdge)), hn::Zero(di)));
+            value =
+                hn::IfThenElse(hn::RebindMask(d, mixes), hn::Mul(value, hn::Set(d, mixed)), value);
             hn::Store(hn::IfThenElseZero(on, value), d, out + kTaps * j);
         }
         return;
@@ -220,6 +230,7 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
                 p + std::clamp(pu * du + pv * dv, -kFarthestTap * scale, kFarthestTap * scale);
             if (std::abs(there - predicted) > allowed) continue;
             value = source.hasAlpha ? source.alphaAt(taps, i, j) : 1.0f;
+            if (Info::mixesColours(taps.page->info.data()[taps.texel(i, j)])) value *= mixed;
         }
     }
 }
@@ -331,7 +342,8 @@ HWY_INLINE void keepHeaviest(const Group& g, int most, GroupTaps& t) {
 }
 
 /// The first taps of a source, and which of them lie on the surface of their lane.
-HWY_INLINE void findTaps(const Group& g, const ShadeSource& source, int s, GroupTaps& t) {
+HWY_INLINE void findTaps(const Group& g, const ShadeSource& source, int s, float mixed,
+                         GroupTaps& t) {
     const hn::ScalableTag<float> d;
     using V = hn::Vec<decltype(d)>;
     const GroupSource& view = t.views[s];
@@ -348,7 +360,7 @@ HWY_INLINE void findTaps(const Group& g, const ShadeSource& source, int s, Group
         if (l >= g.count || !(view.weight[l] > 0.0f)) continue;
         alignas(16) float mask[kTaps * kTaps];
         maskTaps(source, g, l, view.u[l], view.v[l], view, static_cast<int>(t.bases[s][0][l]),
-                 static_cast<int>(t.bases[s][1][l]), mask);
+                 static_cast<int>(t.bases[s][1][l]), mixed, mask);
         for (int i = 0; i < kTaps * kTaps; ++i) t.masks[s][i][l] = mask[i];
     }
 }
@@ -369,13 +381,13 @@ HWY_INLINE void addMoments(int s, float kernel, GroupTaps& t, Lanes* moments) {
 }
 
 /// The polynomials of all lanes out of their moments: what makes the fit's middle of the taps.
-HWY_INLINE void solveGroup(const Lanes* moments, float ridge, Lanes* rows) {
+HWY_INLINE void solveGroup(const Lanes* moments, const ShadeSettings& settings, Lanes* rows) {
     const hn::ScalableTag<float> d;
     for (int l = 0; l < kGroup; l += static_cast<int>(hn::Lanes(d))) {
         hn::Vec<decltype(d)> m[kMoments], row[6];
         for (int i = 0; i < kMoments; ++i) m[i] = hn::LoadU(d, &moments[i][l]);
         m[0] = hn::Max(m[0], hn::Set(d, 1e-12f));
-        solveFirstRow(d, m, hn::Set(d, ridge), row);
+        solveFirstRow(d, m, settings.kernel, settings.ridge, row);
         for (int i = 0; i < 6; ++i) hn::StoreU(row[i], d, &rows[i][l]);
     }
 }
@@ -465,14 +477,18 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
     Lanes moments[kMoments] = {};
     for (int k = 0; k < t.count; ++k) {
         const int s = t.list[k];
-        findTaps(g, sources[static_cast<std::size_t>(s)], s, t);
+        const ShadeSource& source = sources[static_cast<std::size_t>(s)];
+        const float mixed = source.source->view->depthMayBeUnknown()
+                                ? std::max(kMixedTap, settings.edgeWeight)
+                                : 1.0f;
+        findTaps(g, source, s, mixed, t);
         if (t.views[s].narrow)
             addMoments<kNarrow>(s, settings.kernel, t, moments);
         else
             addMoments<kTaps>(s, settings.kernel, t, moments);
     }
     Lanes rows[6];
-    solveGroup(moments, settings.ridge, rows);
+    solveGroup(moments, settings, rows);
 
     ColourSum sums[kGroup] = {};
     alignas(64) float total[kGroup] = {};

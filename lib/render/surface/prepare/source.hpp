@@ -49,10 +49,17 @@ struct SourceBlock : BlockRange {
 /// Bits of PreparedPage::info; the distance to the nearest edge is above them, from bit 4 on.
 struct Info {
     static constexpr std::uint8_t kLinkRight = 1, kLinkDown = 2, kBesideBackground = 4, kCrease = 8;
+    /// All 0 on edges that are not outlines.
+    static constexpr std::uint8_t kAwayFromInnerEdge = 0xf0 | kBesideBackground;
 
     /// How far a pixel is from where another surface may have a part in its colour: the nearest
     /// edge, or a crease that runs through it.
     [[nodiscard]] static int ownColour(std::uint8_t info) { return info & kCrease ? 0 : info >> 4; }
+    /// Whether two surfaces have a part in the colour of a pixel: on a crease, or on an edge beside
+    /// another surface. Beside background alpha tells how much of the pixel is background.
+    [[nodiscard]] static bool mixesColours(std::uint8_t info) {
+        return (info & kCrease) != 0 || (info & kAwayFromInnerEdge) == 0;
+    }
 };
 
 /// What surface mode knows of each texel of a page.
