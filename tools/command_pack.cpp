@@ -170,20 +170,25 @@ Result<int> packViews(const PackOptions& o, std::unique_ptr<ViewTable> views, Pa
     return 0;
 }
 
-/// Prunes views, if that is asked for. They are looked at one by one, unless pictures of all are
-/// compared.
+/// What pruning as it is asked for keeps of views.
+Result<Pruning> pruningOf(const PackOptions& o, const ViewTable& views, Job& job) {
+    return o.minPsnr > 0 ? findPruningToQuality(views, o.pruning, o.minPsnr, job)
+                         : findPruning(views, o.pruning, job);
+}
+
+/// Prunes views, if that is asked for.
 Result<std::optional<PrunedTo>> pruneViews(const PackOptions& o, const std::string& input,
                                            std::unique_ptr<ViewTable>& views, Job& job) {
     if (!prunes(o)) return std::optional<PrunedTo>();
-    if (o.minPsnr > 0) {
-        STX_TRY(auto bundle, wholeBundle(std::move(views), job));
-        STX_TRY(const auto report, pruneOne(bundle, o, input, job));
-        views = tableOf(std::move(bundle));
-        return PrunedTo{report, true};
-    }
-    auto pruning = findPruning(*views, o.pruning, job);
+    const auto found = [&]() -> Result<Pruning> {
+        // Whole views take as much of an atlas, pruned or not: that is known before the work.
+        if (o.settings.layout == PackSettings::Layout::grid && o.inputs.size() == 1)
+            STX_CHECK(checkGrid(*views, o.settings, job.limits));
+        return pruningOf(o, *views, job);
+    };
+    auto pruning = found();
     if (!pruning) return tl::unexpected(pruning.error().at(fmt::format("'{}'", input)));
-    const PrunedTo pruned{pruning->report};
+    const PrunedTo pruned{pruning->report, o.minPsnr > 0};
     views = prunedViews(std::move(views), std::move(*pruning));
     return pruned;
 }

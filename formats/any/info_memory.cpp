@@ -7,6 +7,7 @@
 #include "lib/base/counted.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/packing/views_one_by_one.hpp"
+#include "lib/quality/prune_quality.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
 #include "lib/splats/from_bundle.hpp"
@@ -23,6 +24,7 @@ struct ViewCommand {
         atEach,       ///< one at a time, where they come on demand
         atRefined,    ///< the same; where they are refined before, from a spool if that takes less
         whilePacked,  ///< the same, beside the atlas
+        whilePruned,  ///< the same, after pictures of all
         whileRefined,
         atSurfaces,  ///< at all, where the limit allows it; else at one at a time, from a spool
         atDiscs,     ///< the same
@@ -45,6 +47,7 @@ constexpr ViewCommand kCommands[] = {
     {"render --light", &peak::kLitSurfaceMode, &peak::kLitSurfaceMode, atAll},
     {"render --mode splat --light", &peak::kLitSplatMode, &peak::kLitSplatMode, atAll},
     {"pack", &peak::kAtlas, &peak::kAtlas, whilePacked},
+    {"pack --min-psnr", &peak::kAtlas, &peak::kAtlas, whilePruned},
     {"select", &peak::kSelect, &peak::kSelect, atEach},
     {"refine", &peak::kRefine, &peak::kRefine, whileRefined},
     {"extract -o NAME.ply", &peak::kPoints, &peak::kPoints, atRefined},
@@ -80,6 +83,8 @@ class MemoryOfCommands {
                 return withRefining(each(takes, onDemand_ && (!refines_ || spooled_)));
             case whilePacked:
                 return withRefining(packed(takes));
+            case whilePruned:
+                return withRefining(pruned(takes));
             case whileRefined:
                 return {refining_, !spooled_};
             case atSurfaces:
@@ -113,6 +118,11 @@ class MemoryOfCommands {
         for (std::size_t i = 0; !one && onDemand_ && i < table_.count(); ++i)
             viewsBeside += table_.bytesOf(i);
         return {*grid + viewsBeside, !one};
+    }
+    [[nodiscard]] Takes pruned(const PeakMemory& takes) const {
+        return {std::max({packed(takes).bytes, memoryOfPruning(table_),
+                          memoryOfAll(table_, kDrawnAfterPruning)}),
+                true};
     }
     [[nodiscard]] Takes grouped(const PeakMemory& takes) const {
         const std::uint64_t all = memoryOfAll(table_, takes);

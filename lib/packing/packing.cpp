@@ -253,7 +253,23 @@ std::uint64_t pixelsOf(const AtlasLayout& layout) {
            static_cast<std::uint64_t>(layout.pages);
 }
 
+/// Of the pages, and with views that are in memory.
+Result<void> checkAtlas(const ViewTable& table, const AtlasLayout& layout, const Contents& contents,
+                        const Limits& limits) {
+    return limits.checkAllocation(
+        pixelsOf(layout), (table.whole() ? 2 : 1) * contents.bytesPerPixel() + contents.toWrite(),
+        "an atlas");
+}
+
 }  // namespace
+
+Result<void> checkGrid(const ViewTable& table, const PackSettings& settings, const Limits& limits) {
+    STX_CHECK(checkSettings(table, settings));
+    const Contents contents = contentsOf(table.kinds());
+    STX_TRY(const AtlasLayout layout,
+            gridLayout(table.about(), settings, 4 / contents.texturesPerPage()));
+    return checkAtlas(table, layout, contents, limits);
+}
 
 Result<std::uint64_t> memoryOfGrid(const ViewTable& table, const PackSettings& settings) {
     const Contents contents = contentsOf(table.kinds());
@@ -273,10 +289,7 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
     STX_TRY(AtlasLayout layout, layoutOf(table, settings, 4 / contents.texturesPerPage(), job));
     if (layout.rectangles.empty())
         return fail(ErrorCode::invalidInput, "none of the {} views has a point to pack", count);
-    // With views that are in memory.
-    STX_CHECK(job.limits.checkAllocation(
-        pixelsOf(layout), (table.whole() ? 2 : 1) * contents.bytesPerPixel() + contents.toWrite(),
-        "an atlas"));
+    STX_CHECK(checkAtlas(table, layout, contents, job.limits));
     Atlas atlas = emptyAtlas(table, layout, contents, settings);
     const bool tight = settings.layout == PackSettings::Layout::tight;
     const std::vector<int> source = keptViews(table.about(), tight, layout.rectangles, job);

@@ -25,6 +25,8 @@ constexpr int kSilhouetteBand = 2;
 /// What forEachView() may take to prepare a view beside it: its surface and room for its points,
 /// and what is kept of both; see PruneView.
 constexpr PeakMemory kPreparing = {"pruning", 40};
+/// What is looked at of points, bytes for each pixel of all views at most.
+constexpr std::uint64_t kOfPoints = 24;
 
 /// Views by what each adds to the coverage; empty ones last. `points`: of all views.
 std::vector<int> rankViews(const std::vector<PruneView>& prepared, std::int64_t points) {
@@ -349,10 +351,13 @@ Result<std::int64_t> giveAwayTo(std::int64_t budget, std::vector<PruneView>& vie
 /// Views without what another view shows. Nothing else of them changes.
 class PrunedViews : public ViewTable {
   public:
-    PrunedViews(std::unique_ptr<ViewTable> table, Bundle headers, Pruning pruning)
-        : ViewTable(std::move(headers), table->kinds(),
-                    table->planesKnown() ? Planes::known : Planes::withPixels),
-          table_(std::move(table)),
+    /// `own`: the table, if this is to keep it; may be null.
+    PrunedViews(const ViewTable& table, std::unique_ptr<ViewTable> own, Bundle headers,
+                Pruning pruning)
+        : ViewTable(std::move(headers), table.kinds(),
+                    table.planesKnown() ? Planes::known : Planes::withPixels),
+          table_(&table),
+          own_(std::move(own)),
           pruning_(std::move(pruning)) {}
 
     std::uint64_t bytesHeld() const override { return table_->bytesHeld(); }
@@ -376,18 +381,41 @@ class PrunedViews : public ViewTable {
     }
 
   private:
-    std::unique_ptr<ViewTable> table_;
+    const ViewTable* table_;
+    std::unique_ptr<ViewTable> own_;
     Pruning pruning_;
 };
 
+std::unique_ptr<ViewTable> prunedTable(const ViewTable& table, std::unique_ptr<ViewTable> own,
+                                       Pruning pruning) {
+    Bundle headers = headersOf(table.about());
+    for (std::size_t i = 0; i < headers.views.size(); ++i)
+        if (pruning.changed[i]) headers.views[i].pruned = true;
+    return std::make_unique<PrunedViews>(table, std::move(own), std::move(headers),
+                                         std::move(pruning));
+}
+
+std::uint64_t pixelsOf(const ViewTable& table) {
+    std::uint64_t pixels = 0;
+    for (std::size_t i = 0; i < table.count(); ++i) pixels += table.pixelsOf(i);
+    return pixels;
+}
+
 }  // namespace
+
+std::uint64_t memoryOfPruning(const ViewTable& table) {
+    return std::max(table.bytesHeld() + kOfPoints * pixelsOf(table),
+                    memoryOfEach(table, kPreparing));
+}
+
+Result<void> checkPruning(const ViewTable& table, const Limits& limits) {
+    return limits.checkAllocation(pixelsOf(table), kOfPoints, kPreparing.what);
+}
 
 Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& settings, Job& job) {
     STX_CHECK(checkSettings(settings));
     if (table.whole()) STX_CHECK(table.about().check());
-    std::uint64_t pixels = 0;
-    for (std::size_t i = 0; i < table.count(); ++i) pixels += table.pixelsOf(i);
-    STX_CHECK(job.limits.checkAllocation(pixels, 24, "pruning"));
+    STX_CHECK(checkPruning(table, job.limits));
     Pruning out;
     PruneReport& report = out.report;
     std::vector<PruneView> views(table.count());
@@ -444,19 +472,24 @@ Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& setting
 
 Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& job) {
     STX_TRY(const Pruning pruning, findPruning(*viewsOf(bundle), settings, job));
+    keepOnly(pruning, bundle);
+    return pruning.report;
+}
+
+void keepOnly(const Pruning& pruning, Bundle& bundle) {
     parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
         keepOnly(pruning.kept[static_cast<std::size_t>(i)],
                  bundle.views[static_cast<std::size_t>(i)]);
     });
-    return pruning.report;
 }
 
 std::unique_ptr<ViewTable> prunedViews(std::unique_ptr<ViewTable> table, Pruning pruning) {
-    Job none;  // nothing is read
-    Bundle headers = *someViews(*table, std::vector<bool>(table->count(), false), nullptr, none);
-    for (std::size_t i = 0; i < headers.views.size(); ++i)
-        if (pruning.changed[i]) headers.views[i].pruned = true;
-    return std::make_unique<PrunedViews>(std::move(table), std::move(headers), std::move(pruning));
+    const ViewTable& of = *table;
+    return prunedTable(of, std::move(table), std::move(pruning));
+}
+
+std::unique_ptr<ViewTable> prunedViews(const ViewTable& table, Pruning pruning) {
+    return prunedTable(table, nullptr, std::move(pruning));
 }
 
 }  // namespace stx

@@ -34,6 +34,12 @@ struct Pruning {
     std::vector<Image<std::uint8_t>> kept;  ///< 1 = a point that stays
     std::vector<bool> changed;              ///< some point goes
 };
+/// Takes what pruning does not keep out of the views of a bundle in memory.
+void keepOnly(const Pruning& pruning, Bundle& bundle);
+/// What pruning takes at its peak, bytes.
+[[nodiscard]] std::uint64_t memoryOfPruning(const ViewTable& table);
+/// Error (invalidInput) where that is above the limit, with a limit that would do.
+[[nodiscard]] Result<void> checkPruning(const ViewTable& table, const Limits& limits);
 /// What prune() does, of views that are looked at one by one, once. What is looked at of their
 /// points stays in memory meanwhile: 21 bytes for each pixel of the blocks of 16x16 that have some
 /// (33 where colour is linear), and one or two for each pixel.
@@ -42,7 +48,12 @@ struct Pruning {
 /// The views without what goes, each when it is asked for.
 [[nodiscard]] std::unique_ptr<ViewTable> prunedViews(std::unique_ptr<ViewTable> table,
                                                      Pruning pruning);
+/// The same; the table must outlive it.
+[[nodiscard]] std::unique_ptr<ViewTable> prunedViews(const ViewTable& table, Pruning pruning);
 
+/// The errors of pack() of whole views (Layout::grid) that are known before a pixel is looked at.
+[[nodiscard]] Result<void> checkGrid(const ViewTable& table, const PackSettings& settings,
+                                     const Limits& limits);
 /// Memory that packing whole views (Layout::grid) and writing the atlas take at their peak, what
 /// the table holds included, bytes. Looks at no pixel. Errors: views that cannot fit.
 [[nodiscard]] Result<std::uint64_t> memoryOfGrid(const ViewTable& table,

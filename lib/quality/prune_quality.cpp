@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "lib/quality/view_quality.hpp"
 #include "lib/render/surface/cpu/cpu_surface.hpp"
@@ -52,75 +56,94 @@ std::vector<Camera> posesOf(const Bundle& bundle) {
     return poses;
 }
 
-/// The search of pruneToQuality(). Leaves the notes of what it settles on in the job.
-Result<PruneReport> search(Bundle& bundle, const PruneSettings& settings, double wantedPsnr,
-                           Job& job) {
-    STX_TRY(const auto quality,
-            ViewQuality::against(*makeCpuSurfaceRenderer(PageSet(bundle).refined({}), {}, job),
-                                 posesOf(bundle), job));
-    Bundle best;
-    PruneReport report;
-    std::vector<std::string> notes;
+std::unique_ptr<Renderer> pruneRenderer(const Bundle& bundle, Job& job) {
+    return makeCpuSurfaceRenderer(PageSet(bundle).refined({}), {}, job);
+}
+
+Result<ViewQuality> picturesBefore(const ViewTable& table, Job& job) {
+    const auto of = [&job](const Bundle& bundle) {
+        return ViewQuality::against(*pruneRenderer(bundle, job), posesOf(bundle), job);
+    };
+    if (table.whole()) return of(table.about());
+    STX_TRY(const Bundle bundle, wholeBundle(table, job));
+    return of(bundle);
+}
+
+/// Of views without those points that pruning takes, dB; the worst picture's.
+Result<double> psnrOf(const ViewTable& table, const Pruning& pruning, const ViewQuality& quality,
+                      Job& job) {
+    STX_TRY(const Bundle kept, wholeBundle(*prunedViews(table, pruning), job));
+    STX_TRY(const auto psnr, quality.measure(*pruneRenderer(kept, job), job));
+    return psnr.worst;
+}
+
+/// What keeps all.
+Pruning nothingPruned(const ViewTable& table, std::int64_t points) {
+    Pruning out;
+    out.report.sourcePixels = out.report.keptPixels = points;
+    out.report.psnr = std::numeric_limits<double>::infinity();
+    out.changed.resize(table.count(), false);
+    for (const ReferenceView& view : table.about().views)
+        out.kept.emplace_back(view.camera.width, view.camera.height, std::uint8_t{1});
+    return out;
+}
+
+}  // namespace
+
+Result<Pruning> findPruningToQuality(const ViewTable& table, const PruneSettings& settings,
+                                     double wantedPsnr, Job& job) {
+    if (!(wantedPsnr > 0) || std::isinf(wantedPsnr))
+        return fail(ErrorCode::usage, "the least PSNR is {:g} dB; it must be over 0", wantedPsnr);
+    STX_CHECK(checkPruning(table, job.limits));
+    STX_CHECK(job.limits.checkAllocation(memoryOfAll(table, kDrawnAfterPruning), 1,
+                                         kDrawnAfterPruning.what));
+    Job quiet;  // what reading says is said where the views are packed
+    quiet.workFor(job);
+    STX_TRY(const auto quality, picturesBefore(table, quiet));
+    std::optional<Pruning> best;
+    std::vector<std::string> notes;  // of the best
+    std::int64_t points = 0;
     const auto reaches = [&](double estimate) -> Result<bool> {
-        (void)job.takeNotes();  // of the attempt before
-        Bundle candidate = bundle;
+        Job attempt;
+        attempt.workFor(job);
         PruneSettings now = settings;
         now.minPsnr = estimate;
-        STX_TRY(auto pruned, prune(candidate, now, job));
-        STX_TRY(
-            const auto psnr,
-            quality.measure(*makeCpuSurfaceRenderer(PageSet(candidate).refined({}), {}, job), job));
-        pruned.psnr = psnr.worst;
-        if (!(pruned.psnr >= wantedPsnr)) return false;
-        best = std::move(candidate);
-        report = pruned;
-        notes = job.takeNotes();
+        STX_TRY(auto pruned, findPruning(table, now, attempt));
+        points = pruned.report.sourcePixels;
+        auto said = attempt.takeNotes();
+        STX_TRY(pruned.report.psnr, psnrOf(table, pruned, quality, quiet));
+        if (!(pruned.report.psnr >= wantedPsnr)) return false;
+        best = std::move(pruned);
+        notes = std::move(said);
         return true;
     };
-    STX_TRY(bool found, reaches(kLeast));
-    if (!found) {
+    STX_TRY(const bool least, reaches(kLeast));
+    if (!least) {
         double fails = kLeast, holds = kMost;
         // What the estimate promises is seldom kept: the search starts there.
         for (double middle = std::clamp(wantedPsnr, kLeast + kNear, kMost - kNear);
              holds - fails > kNear; middle = 0.5 * (fails + holds)) {
             STX_TRY(const bool good, reaches(middle));
-            found = found || good;
             (good ? holds : fails) = middle;
         }
     }
-    (void)job.takeNotes();
-    if (!found) {
-        const auto pixels = bundle.pointCount();
-        if (settings.budget > 0 && settings.budget < pixels)
-            return fail(
-                ErrorCode::invalidInput,
-                "a budget of {} pixels and {:g} dB cannot both be had: allow more pixels or "
-                "ask for less",
-                settings.budget, wantedPsnr);
-        job.note(
-            fmt::format("nothing is pruned: {:g} dB are reached by all pixels only", wantedPsnr));
-        report.sourcePixels = report.keptPixels = pixels;
-        report.psnr = std::numeric_limits<double>::infinity();
-        return report;
-    }
     for (auto& note : notes) job.note(std::move(note));
-    bundle = std::move(best);
-    return report;
+    if (best) return std::move(*best);
+    if (settings.budget > 0 && settings.budget < points)
+        return fail(ErrorCode::invalidInput,
+                    "a budget of {} pixels and {:g} dB cannot both be had: allow more pixels or "
+                    "ask for less",
+                    settings.budget, wantedPsnr);
+    job.note(fmt::format("nothing is pruned: {:g} dB are reached by all pixels only", wantedPsnr));
+    return nothingPruned(table, points);
 }
-
-}  // namespace
 
 Result<PruneReport> pruneToQuality(Bundle& bundle, const PruneSettings& settings, double wantedPsnr,
                                    Job& job) {
-    if (!(wantedPsnr > 0) || std::isinf(wantedPsnr))
-        return fail(ErrorCode::usage, "the least PSNR is {:g} dB; it must be over 0", wantedPsnr);
     STX_CHECK(bundle.check());
-    auto earlier = job.takeNotes();
-    auto report = search(bundle, settings, wantedPsnr, job);
-    auto ours = job.takeNotes();
-    for (auto& note : earlier) job.note(std::move(note));
-    for (auto& note : ours) job.note(std::move(note));
-    return report;
+    STX_TRY(const auto pruning, findPruningToQuality(*viewsOf(bundle), settings, wantedPsnr, job));
+    keepOnly(pruning, bundle);
+    return pruning.report;
 }
 
 }  // namespace stx

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "lib/packing/prune.hpp"
+#include "lib/packing/views_one_by_one.hpp"
 
 namespace stx {
 
@@ -13,5 +14,14 @@ namespace stx {
 /// Errors: those of prune(); a budget that forbids what was asked, with both.
 [[nodiscard]] Result<PruneReport> pruneToQuality(Bundle& bundle, const PruneSettings& settings,
                                                  double wantedPsnr, Job& job);
+/// The same of views that are read when they are looked at: for the pictures before, and twice for
+/// each attempt. Those to be drawn are in memory, after what pruning knows of them is gone. Errors
+/// (invalidInput), before a view is read, where either takes more than the limit.
+[[nodiscard]] Result<Pruning> findPruningToQuality(const ViewTable& table,
+                                                   const PruneSettings& settings, double wantedPsnr,
+                                                   Job& job);
+/// What that takes beside pruning, of views in memory: pictures of all of them are drawn.
+inline constexpr PeakMemory kDrawnAfterPruning = {"drawing what pruning keeps",
+                                                  peak::kSurfaceMode.perPixel + 2};
 
 }  // namespace stx

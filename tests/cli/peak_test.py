@@ -193,7 +193,8 @@ INFO_COMMANDS = {"convert -o NAME.exr": "convert {} -o OUT.exr", "convert -o NAM
         "render --mode splat": "render {} -o OUT.png --eye 0.1,0,0 --target 0,0,-3 --size 64x64 --backend cpu --mode splat",
         "render --light": "render {} -o OUT.png --eye 0.1,0,0 --target 0,0,-3 --size 64x64 --backend cpu --light dir:0,0,-1",
         "render --mode splat --light": "render {} -o OUT.png --eye 0.1,0,0 --target 0,0,-3 --size 64x64 --backend cpu --mode splat --light dir:0,0,-1",
-        "pack": "pack {} -o OUT", "select": "select {} -o OUT.exr --count 1", "refine": "refine {} -o OUT.exr --with noise",
+        "pack": "pack {} -o OUT", "pack --min-psnr": "pack {} -o OUT --min-psnr 40",
+        "select": "select {} -o OUT.exr --count 1", "refine": "refine {} -o OUT.exr --with noise",
         "extract -o NAME.ply": "extract {} -o OUT.ply", "extract -o NAME.ply --as splats": "extract {} -o OUT.ply --as splats",
         "extract -o NAME.glb": "extract {} -o OUT.glb", "extract -o NAME.html": "extract {} -o OUT.html"}
 
@@ -382,6 +383,8 @@ def model_of_few(args, folder):
 # Of pruning 36 views of 512² of which a third is points, and of an atlas of them, bytes for each pixel of the views. All
 # views, what pruning knows of each pixel and the atlas side by side take 40.
 PRUNE = 20
+# Of pruning them by pictures, MiB: a limit with room for the atlas, but not for all views beside it.
+PRUNE_LIMIT = 224
 
 
 def pruned_one_by_one(args, folder):
@@ -407,6 +410,18 @@ def pruned_one_by_one(args, folder):
             # The pages are 24 bytes a pixel at most, of views in memory 32.
             elif not peak - PROGRAM <= said <= 1.7 * peak:
                 wrong.append(f"{name}: {peak:.1f} MiB, but stx info --memory says {said:.1f}")
+    name, made = "few pack --min-psnr", []
+    if os.path.exists(args.model) and args.only in name:
+        for limit in (NOISY_IN_MEMORY, PRUNE_LIMIT):
+            done = must([args.stx, "pack", "many36.exr", "-o", f"measured{limit}", "--min-psnr", "20", "--threads", "2", "--max-memory", str(limit)], folder)
+            made.append(files_of(os.path.join(folder, f"measured{limit}")))
+            peak = done.usage.ru_maxrss / 1024
+            if args.measure:
+                print(f"{name:46} {peak:6.1f} MiB at --max-memory {limit}", flush=True)
+            elif peak > PRUNE_LIMIT + PROGRAM:
+                wrong.append(f"{name}: {peak:.1f} MiB at --max-memory {limit}")
+        if made[0] != made[1]:
+            wrong.append(f"{name}: the atlas is not that of a larger --max-memory")
     return wrong
 
 
