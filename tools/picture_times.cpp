@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "lib/render/factory.hpp"
+#include "tools/drawn_views.hpp"
 #include "tools/environment_options.hpp"
 #include "tools/program.hpp"
 
@@ -122,11 +124,12 @@ std::pair<int, int> streamRateOf(const Timeline& line, const char* what, Job& jo
 }
 
 MovingPictures::MovingPictures(std::unique_ptr<Sequence> frames, RenderSettings settings,
-                               Backend backend, int device, Job& job)
+                               Backend backend, int device, std::filesystem::path folder, Job& job)
     : frames_(std::move(frames)),
       settings_(std::move(settings)),
       backend_(backend),
       device_(device),
+      folder_(std::move(folder)),
       job_(job) {
     ahead_.workFor(job);
 }
@@ -136,19 +139,45 @@ MovingPictures::~MovingPictures() {
     if (coming_.valid()) coming_.wait();
 }
 
-Result<Bundle> MovingPictures::bundleOf(std::size_t frame) {
+Result<MovingPictures::FrameViews> MovingPictures::read(std::size_t frame, Job& job) {
+    FrameViews out;
+    if (!fits_) {
+        STX_TRY(auto table, frames_->views(frame, job));
+        const PeakMemory& drawing = drawingMemory(settings_);
+        if (!table->whole() && !fitInMemory(*table, drawing, job.limits)) {
+            STX_TRY(out.bundle,
+                    viewsToDraw(*table, drawing, std::vector<bool>(table->count(), true), folder_,
+                                out.spool, job));
+            return out;
+        }
+        fits_ = true;
+        if (table->whole()) {
+            STX_TRY(out.bundle, wholeBundle(std::move(table), job));
+            return out;
+        }
+    }
+    STX_TRY(out.bundle, frames_->frame(frame, job));
+    return out;
+}
+
+Result<MovingPictures::FrameViews> MovingPictures::viewsOf(std::size_t frame) {
     if (coming_.valid()) {
-        auto bundle = coming_.get();
-        if (comingFrame_ == frame) return bundle;
+        auto views = coming_.get();
+        if (comingFrame_ == frame) return views;
     }
     // Notes are those of the first frame: others say the same again.
-    return frames_->frame(frame, frame_ ? ahead_ : job_);
+    return read(frame, frame_ ? ahead_ : job_);
 }
 
 Result<Renderer*> MovingPictures::at(double time, std::optional<double> next) {
     const std::size_t frame = timeline().frameAt(time);
     if (frame_ != frame) {
-        STX_TRY(auto bundle, bundleOf(frame));
+        if (!fits_) {  // there is room for one
+            renderer_.reset();
+            spooled_ = {};
+        }
+        STX_TRY(auto shown, viewsOf(frame));
+        Bundle& bundle = shown.bundle;
         frame_ = frame;
         views_.clear();
         for (const ReferenceView& view : bundle.views) views_.push_back(view.camera);
@@ -172,14 +201,19 @@ Result<Renderer*> MovingPictures::at(double time, std::optional<double> next) {
         }
         if (light_) settings.lighting.environment = ownLight_;
         environment_ = settings.environment != nullptr;
-        STX_TRY(renderer_, rendererOf(std::move(bundle), settings, job_, backend_, device_));
+        if (shown.spool) {
+            spooled_ = std::move(shown);
+            STX_TRY(renderer_, makeRenderer(backend_, spooled_.bundle, *spooled_.spool, settings,
+                                            device_, job_));
+        } else {
+            STX_TRY(renderer_, rendererOf(std::move(bundle), settings, job_, backend_, device_));
+        }
     }
-    if (next) {
+    if (next && fits_) {
         const std::size_t later = timeline().frameAt(*next);
         if (later != frame && !coming_.valid()) {
             comingFrame_ = later;
-            coming_ = std::async(std::launch::async,
-                                 [this, later] { return frames_->frame(later, ahead_); });
+            coming_ = std::async(std::launch::async, [this, later] { return read(later, ahead_); });
         }
     }
     return renderer_.get();

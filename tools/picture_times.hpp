@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <future>
 #include <memory>
 #include <optional>
@@ -7,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "formats/files/file_spool.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/model/sequence.hpp"
 
@@ -43,12 +45,12 @@ void noteOutside(const std::vector<double>& times, const Timeline& timeline, Job
 [[nodiscard]] std::pair<int, int> streamRateOf(const Timeline& line, const char* what, Job& job);
 
 /// Renderers of the frames of a sequence, one after another; the next frame is read while one is
-/// drawn.
+/// drawn. Frames that memory does not hold are drawn from files, one at a time (viewsToDraw()).
 class MovingPictures {
   public:
-    /// `job` must outlive this.
+    /// Files are made in `folder`. `job` must outlive this.
     MovingPictures(std::unique_ptr<Sequence> frames, RenderSettings settings, Backend backend,
-                   int device, Job& job);
+                   int device, std::filesystem::path folder, Job& job);
     ~MovingPictures();
 
     [[nodiscard]] const Timeline& timeline() const { return frames_->timeline(); }
@@ -68,16 +70,25 @@ class MovingPictures {
     [[nodiscard]] Result<Renderer*> at(double time, std::optional<double> next);
 
   private:
-    [[nodiscard]] Result<Bundle> bundleOf(std::size_t frame);
+    /// The views of a frame, in memory, or in a spool where that does not hold them.
+    struct FrameViews {
+        std::unique_ptr<FileSpool> spool;  ///< may be null
+        Bundle bundle;
+    };
+    [[nodiscard]] Result<FrameViews> viewsOf(std::size_t frame);
+    [[nodiscard]] Result<FrameViews> read(std::size_t frame, Job& job);
 
     std::unique_ptr<Sequence> frames_;
     RenderSettings settings_;
     Backend backend_;
     int device_;
+    std::filesystem::path folder_;
     Job& job_;
-    Job ahead_;  ///< of the frame that is read beside the drawing
-    std::future<Result<Bundle>> coming_;
+    Job ahead_;          ///< of the frame that is read beside the drawing
+    bool fits_ = false;  ///< a frame has been in memory: all have views of the same sizes
+    std::future<Result<FrameViews>> coming_;
     std::optional<std::size_t> comingFrame_, frame_;
+    FrameViews spooled_;  ///< the frame that is drawn, where it is in a spool
     std::unique_ptr<Renderer> renderer_;
     std::vector<Camera> views_;
     std::shared_ptr<const Environment> own_;  ///< of the frames

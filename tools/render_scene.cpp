@@ -129,8 +129,8 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
         if (sways) {
             STX_TRY(scene.context.sway, swayPose(o, *frames, program.job));
         }
-        scene.moving = std::make_unique<MovingPictures>(std::move(frames), settings, o.backend,
-                                                        o.device, program.job);
+        scene.moving = std::make_unique<MovingPictures>(
+            std::move(frames), settings, o.backend, o.device, folderBeside(o.output), program.job);
         if (lightsByEnvironment(o)) scene.moving->lightByEnvironment();
         STX_TRY(const auto times, timesOf(o.time, scene.moving->timeline()));
         STX_CHECK(scene.moving->at(times.front(), {}));

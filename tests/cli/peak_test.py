@@ -350,6 +350,37 @@ def cube_of_few(args, folder):
     return wrong
 
 
+def film_of_few(args, folder):
+    """What is not the same, or takes too much, of pictures of a film whose frames do not fit memory."""
+    wrong = []
+    modes = [mode for mode in ("surface", "splat") if args.only in f"film {mode}"]
+    if not modes:
+        return wrong
+    film = os.path.join(folder, "film")
+    turned_set(film, TURNED_VIEWS, 512)
+    png(os.path.join(film, "later.png"), 512, 512, "rgb", lambda y: bytes(v for x in range(512) for v in (90, x // 2, y // 2)))
+    with open(os.path.join(film, "transforms.json"), encoding="utf-8") as file:
+        scene = json.load(file)
+    scene["frames"] = [view | {"camera": i, "time": moment, "file_path": picture}
+                       for moment, picture in ((0, "c.png"), (1, "later.png")) for i, view in enumerate(scene["frames"])]
+    write(os.path.join(film, "transforms.json"), json.dumps(scene))
+    must([args.stx, "convert", "film", "-o", "film.exr"], folder)
+    for mode in modes:
+        name, pictures = f"film {mode}", []
+        for limit in (NOISY_IN_MEMORY, CUBE_LIMIT):
+            done = must([args.stx, "render", "film.exr", "-o", f"{mode}{limit}/%d.png", "--mode", mode, "--times", "all", "--orbit", "2", "--size", "256x256",
+                         "--threads", "2", "--max-memory", str(limit)], folder)
+            pictures.append(files_of(os.path.join(folder, f"{mode}{limit}")))
+            peak = done.usage.ru_maxrss / 1024
+            if args.measure:
+                print(f"{name:20} {peak:6.1f} MiB at --max-memory {limit}", flush=True)
+            elif limit == CUBE_LIMIT and peak > limit + PROGRAM:
+                wrong.append(f"{name}: {peak:.1f} MiB at --max-memory {limit}")
+        if len(pictures[0]) != 2 or pictures[0] != pictures[1]:
+            wrong.append(f"{name}: its pictures are not those of a larger --max-memory")
+    return wrong
+
+
 # Of surfaces and of splats of 36 views of 512² under limits for a fifth and a half of what is asked for them in memory, MiB:
 # what they may take, with the program. In memory they take 180 and 500.
 MODEL_LIMIT, MODEL = 140, 120
@@ -476,6 +507,7 @@ def main():
         wrong += pruned_one_by_one(args, folder)
         wrong += noisy_of_many(args, folder)
         wrong += cube_of_few(args, folder)
+        wrong += film_of_few(args, folder)
     print("\n".join(wrong))
     sys.exit(1 if wrong else 0)
 
