@@ -472,11 +472,11 @@ Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& setting
 
 Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& job) {
     STX_TRY(const Pruning pruning, findPruning(*viewsOf(bundle), settings, job));
-    keepOnly(pruning, bundle);
+    applyPruning(pruning, bundle);
     return pruning.report;
 }
 
-void keepOnly(const Pruning& pruning, Bundle& bundle) {
+void applyPruning(const Pruning& pruning, Bundle& bundle) {
     parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
         keepOnly(pruning.kept[static_cast<std::size_t>(i)],
                  bundle.views[static_cast<std::size_t>(i)]);

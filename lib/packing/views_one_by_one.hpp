@@ -35,7 +35,7 @@ struct Pruning {
     std::vector<bool> changed;              ///< some point goes
 };
 /// Takes what pruning does not keep out of the views of a bundle in memory.
-void keepOnly(const Pruning& pruning, Bundle& bundle);
+void applyPruning(const Pruning& pruning, Bundle& bundle);
 /// What pruning takes at its peak, bytes.
 [[nodiscard]] std::uint64_t memoryOfPruning(const ViewTable& table);
 /// Error (invalidInput) where that is above the limit, with a limit that would do.

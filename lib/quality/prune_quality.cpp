@@ -142,7 +142,7 @@ Result<PruneReport> pruneToQuality(Bundle& bundle, const PruneSettings& settings
                                    Job& job) {
     STX_CHECK(bundle.check());
     STX_TRY(const auto pruning, findPruningToQuality(*viewsOf(bundle), settings, wantedPsnr, job));
-    keepOnly(pruning, bundle);
+    applyPruning(pruning, bundle);
     return pruning.report;
 }
 
