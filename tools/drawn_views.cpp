@@ -12,13 +12,6 @@ constexpr PeakMemory kPreparing = {"drawing", 32};
 
 }  // namespace
 
-bool fitInMemory(const ViewTable& table, const PeakMemory& drawing, const Limits& limits) {
-    std::uint64_t bytes = 0;
-    for (std::size_t i = 0; i < table.count(); ++i)
-        bytes += table.bytesOf(i) + drawing.perPixel * table.pixelsOf(i);
-    return bytes <= limits.maxMemoryBytes;
-}
-
 Result<Bundle> viewsToDraw(
     const ViewTable& table, const PeakMemory& drawing, const std::vector<bool>& wanted,
     const std::filesystem::path& folder, std::unique_ptr<FileSpool>& spool, Job& job,

@@ -10,10 +10,6 @@
 
 namespace stx::tools {
 
-/// Whether all views of a table and what drawing them takes are within the limit.
-[[nodiscard]] bool fitInMemory(const ViewTable& table, const PeakMemory& drawing,
-                               const Limits& limits);
-
 /// Reads views to be drawn, those of `wanted`: into memory, or where they and `drawing`
 /// (drawingMemory()) take more than the limit into `spool`, which is made in `folder` then and must
 /// outlive the bundle. `look`: as that of someViews(). Errors: those of the views; (invalidInput)

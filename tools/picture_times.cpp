@@ -144,7 +144,7 @@ Result<MovingPictures::FrameViews> MovingPictures::read(std::size_t frame, Job& 
     if (!fits_) {
         STX_TRY(auto table, frames_->views(frame, job));
         const PeakMemory& drawing = drawingMemory(settings_);
-        if (!table->whole() && !fitInMemory(*table, drawing, job.limits)) {
+        if (!table->whole() && memoryOfAll(*table, drawing) > job.limits.maxMemoryBytes) {
             STX_TRY(out.bundle,
                     viewsToDraw(*table, drawing, std::vector<bool>(table->count(), true), folder_,
                                 out.spool, job));

@@ -154,7 +154,7 @@ class Measurement:
     def yardstick(self):
         self.ruler.stdin.write("\n")
         self.ruler.stdin.flush()
-        return float(self.ruler.stdout.readline().split()[0])
+        return float(self.ruler.stdout.readline())
 
     def wanted(self, *jobs):
         return any(word in job for job in jobs for word in self.only) if self.only else True
