@@ -27,7 +27,7 @@ struct SlotEntry {
     ivec4 source;                     // its number
 };
 struct TileEntry {
-    int x, y;           // first pixel
+    int x, y;           // first pixel, which may lie before the frame
     uint first, count;  // its sources in locals[]
     float step;         // coarsest depth code of its sources, scene units
     uint core;          // so many of its sources, the first, tell what it shows by themselves, too

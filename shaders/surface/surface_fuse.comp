@@ -44,7 +44,8 @@ void main() {
         ivec2(part % uint(kTile / 16), part / uint(kTile / 16)) * 16 + ivec2(gl_LocalInvocationID.xy);
     uint first = t * uint(kTile * kTile);
     uint index = first + uint(pixel.y * kTile + pixel.x);
-    bool wanted = tile.x + pixel.x < frame.size.x && tile.y + pixel.y < frame.size.y;
+    ivec2 inFrame = ivec2(tile.x, tile.y) + pixel;
+    bool wanted = all(greaterThanEqual(inFrame, ivec2(0))) && all(lessThan(inFrame, frame.size.xy));
 #if CORE
     wanted = wanted && ranges[index].z == kAsksAgain;
     tile.count = tile.core;

@@ -366,13 +366,12 @@ Result<void> SurfaceRenderer::drawBehind(SurfaceRenderer& behind, const SurfaceF
                                          Frame& frame, Image<float>& q) {
     const PixelSpace& space = work.space;
     const int width = frame.colour.width(), height = frame.colour.height();
-    const int tilesX = (width + kTile - 1) / kTile, tilesY = (height + kTile - 1) / kTile;
-    std::vector<std::uint8_t> open(static_cast<std::size_t>(tilesX) * tilesY, 0);
+    std::vector<std::uint8_t> open(static_cast<std::size_t>(work.tiles.count()), 0);
     bool any = false;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             if (frame.colour.at(x, y).a >= kCoveredInFull) continue;
-            open[static_cast<std::size_t>(y / kTile) * tilesX + x / kTile] = 1;
+            open[static_cast<std::size_t>(work.tiles.at({x, y}))] = 1;
             any = true;
         }
     }

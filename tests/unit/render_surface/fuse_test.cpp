@@ -40,7 +40,7 @@ TEST(Fuse, OneSurfaceInAPixelHasNoFlagsWhateverItsMean) {
         const std::vector<LocalSource> sources{{&shows, same, samples.data()},
                                                {&looksPast, same, nullptr}};
         Pieces pieces;
-        fuseTile(sources, grid, space.axis, 0, 0, 1, 1, pieces);
+        fuseTile(sources, grid, space.axis, 0, 0, {1u}, pieces);
         EXPECT_EQ(pieces.size(), 1u) << "samples " << apart << " steps of a float apart";
     }
 }
@@ -85,7 +85,7 @@ Pieces besideTwo(const std::array<std::uint32_t, 4>& third) {
                                            {&scene.sources[1], same, wall.data()},
                                            {&scene.sources[2], same, other.data()}};
     Pieces pieces;
-    fuseTile(sources, grid, space.axis, 0, 0, 1, 1, pieces);
+    fuseTile(sources, grid, space.axis, 0, 0, {1u}, pieces);
     return pieces;
 }
 

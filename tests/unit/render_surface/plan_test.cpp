@@ -30,7 +30,7 @@ TEST_P(PlannedBlocks, AreAllThatShowInATile) {
             if (f.source->blocks[i].qMax > 0) every.push_back(i);
         blocks += every.size();
         drawn += f.blocks.size();
-        for (int tile = 0; tile < frame.tilesX * frame.tilesY; tile += 7) {
+        for (int tile = 0; tile < frame.tiles.count(); tile += 7) {
             const Warp warp =
                 warpFrom(frame.sampleFromPixel(tile, effort.samplesPerPixel) * f.pixelFromSource);
             const auto draw = [&](std::span<const std::uint32_t> some,
@@ -45,6 +45,33 @@ TEST_P(PlannedBlocks, AreAllThatShowInATile) {
     }
     // 2.4 for flat blocks as large in the frame as in their view; those of the object have depth.
     EXPECT_LT(static_cast<double>(drawn), 4.7 * static_cast<double>(blocks));
+}
+
+/// Other tiles would choose other sources, and move outlines by a part of a pixel.
+TEST(PlannedTiles, OfAPartOfAFrameAreThoseOfTheWhole) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 9);
+    const SurfaceScene scene(bundle);
+    const Camera camera = analyticCamera(AnalyticScene::object, 0.4, 9).resized(351, 283);
+    const SurfaceFrame whole = planFrame(scene, boundsOf(scene), Effort{}, camera);
+    for (const glm::ivec2 left : {glm::ivec2(13, 37), glm::ivec2(37, 13), glm::ivec2(200, 150)}) {
+        Camera part = camera;
+        part.width -= left.x;
+        part.height -= left.y;
+        part.cx -= left.x;
+        part.cy -= left.y;
+        const SurfaceFrame frame = planFrame(scene, boundsOf(scene), Effort{}, part);
+        for (int tile = 0; tile < frame.tiles.count(); ++tile) {
+            const glm::ivec2 first(frame.tiles.x(tile), frame.tiles.y(tile));
+            const int same = whole.tiles.at(first + left);
+            ASSERT_EQ(glm::ivec2(whole.tiles.x(same), whole.tiles.y(same)), first + left);
+            std::vector<int> sources, ofWhole;
+            for (const int k : frame.sourcesOf(tile))
+                sources.push_back(frame.sources[static_cast<std::size_t>(k)].source->number);
+            for (const int k : whole.sourcesOf(same))
+                ofWhole.push_back(whole.sources[static_cast<std::size_t>(k)].source->number);
+            EXPECT_EQ(sources, ofWhole) << "tile " << tile << " without the first " << left.x;
+        }
+    }
 }
 
 /// What is said to be seen from behind must have nothing to draw in any tile.
@@ -67,7 +94,7 @@ TEST(TurnedAwayBlocks, DrawNothing) {
             const SampleGrid grid{2};
             std::vector<float> samples(grid.count());
             for (const FrameSource& f : frame.sources) {
-                for (int tile = 0; tile < frame.tilesX * frame.tilesY; tile += 3) {
+                for (int tile = 0; tile < frame.tiles.count(); tile += 3) {
                     std::vector<std::uint32_t> behind;
                     for (const std::uint32_t block : f.blocksOf(tile))
                         if (f.turnedAway[block]) behind.push_back(block);
@@ -99,13 +126,13 @@ TEST_P(PlannedBlocks, AreChosenFromFewViews) {
         camera.fy *= 8;
         camera.cx = -2.0 * camera.width;
         const SurfaceFrame frame = planFrame(scene, boundsOf(scene), effort, camera);
-        const int tiles = frame.tilesX * frame.tilesY;
+        const int tiles = frame.tiles.count();
         std::vector<char> used(frame.sources.size(), 0);
         for (int tile = 0; tile < tiles; ++tile)
             for (const int k : frame.sourcesOf(tile)) used[static_cast<std::size_t>(k)] = 1;
         for (std::size_t k = 0; k < used.size(); ++k) {
             FrameSource whole = frame.sources[k];
-            placeBlocks(whole, frame.space, frame.tilesX, frame.tilesY);
+            placeBlocks(whole, frame.space, frame.tiles);
             for (int tile = 0; tile < tiles; ++tile) {
                 const auto own = frame.sources[k].blocksOf(tile), all = whole.blocksOf(tile);
                 const bool same = std::equal(own.begin(), own.end(), all.begin(), all.end());
@@ -156,8 +183,8 @@ TEST_P(PlannedBlocks, AreOfViewsThatShowAllThatAnyShows) {
         const Camera camera = analyticCamera(GetParam(), angle, 8);
         const SurfaceFrame frame = planFrame(scene, boundsOf(scene), effort, camera);
         std::vector<FrameSource> placed = frame.sources;
-        for (FrameSource& f : placed) placeBlocks(f, frame.space, frame.tilesX, frame.tilesY);
-        for (int tile = 0; tile < frame.tilesX * frame.tilesY; tile += 3) {
+        for (FrameSource& f : placed) placeBlocks(f, frame.space, frame.tiles);
+        for (int tile = 0; tile < frame.tiles.count(); tile += 3) {
             std::fill(chosen.begin(), chosen.end(), 0.0f);
             std::fill(all.begin(), all.end(), 0.0f);
             const std::vector<int>& some = frame.sourcesOf(tile);
@@ -202,8 +229,8 @@ TEST(PlannedTiles, AreChosenWhereBlocksAreBehindTheCamera) {
     int filled = 0;
     for (const FrameSource& f : frame.sources) {
         FrameSource whole = f;
-        placeBlocks(whole, frame.space, frame.tilesX, frame.tilesY);
-        for (int tile = 0; tile < frame.tilesX * frame.tilesY; ++tile) {
+        placeBlocks(whole, frame.space, frame.tiles);
+        for (int tile = 0; tile < frame.tiles.count(); ++tile) {
             if (whole.blocksOf(tile).empty()) continue;
             ++filled;
             EXPECT_FALSE(frame.sourcesOf(tile).empty()) << "tile " << tile;

@@ -44,11 +44,9 @@ struct DrawnTile {
             if (drawn) sources.back().samples = samples.back().data();
         }
     }
-    [[nodiscard]] int columns() const {
-        return std::min(kTile, frame.space.camera.width - frame.tileX(tile));
-    }
-    [[nodiscard]] int rows() const {
-        return std::min(kTile, frame.space.camera.height - frame.tileY(tile));
+    [[nodiscard]] TilePixels pixels() const {
+        const Camera& camera = frame.space.camera;
+        return pixelsInFrame(frame.tiles.x(tile), frame.tiles.y(tile), camera.width, camera.height);
     }
 };
 
@@ -62,14 +60,14 @@ class SettledPixels : public testing::TestWithParam<AnalyticScene> {
 
 TEST_P(SettledPixels, ShowWhatAllTheirSamplesShow) {
     int settled = 0, all = 0, differing = 0, partial = 0, partialSettled = 0;
-    for (int tile = 0; tile < frame.tilesX * frame.tilesY; tile += 3) {
+    for (int tile = 0; tile < frame.tiles.count(); tile += 3) {
         const DrawnTile middles(frame, tile, kMiddles, {kAllSquares, true, {}});
         const DrawnTile fine(frame, tile, kAll);
-        const int x = frame.tileX(tile), y = frame.tileY(tile);
+        const int x = frame.tiles.x(tile), y = frame.tiles.y(tile);
         Pieces few, many;
         const TilePixels open = fuseSettled(middles.sources, kMiddles, frame.space.axis, x, y,
-                                            fine.columns(), fine.rows(), kPerPixel, few);
-        fuseTile(fine.sources, kAll, frame.space.axis, x, y, fine.columns(), fine.rows(), many);
+                                            fine.pixels(), kPerPixel, few);
+        fuseTile(fine.sources, kAll, frame.space.axis, x, y, fine.pixels(), many);
         struct Shown {
             int pieces = 0;
             float share = 0, q = 0, qx = 0, qy = 0;
@@ -89,8 +87,9 @@ TEST_P(SettledPixels, ShowWhatAllTheirSamplesShow) {
             return shown;
         };
         const auto one = shownOf(few), expected = shownOf(many);
-        for (int row = 0; row < fine.rows(); ++row) {
-            for (int column = 0; column < fine.columns(); ++column) {
+        for (int row = 0; row < kTile; ++row) {
+            for (int column = 0; column < kTile; ++column) {
+                if (!(fine.pixels()[static_cast<std::size_t>(row)] >> column & 1)) continue;
                 const auto at = static_cast<std::size_t>(row * kTile + column);
                 const Shown &a = one[at], &b = expected[at];
                 const bool isOpen = open[static_cast<std::size_t>(row)] >> column & 1;
@@ -125,7 +124,7 @@ TEST_P(SettledPixels, ShowWhatAllTheirSamplesShow) {
 TEST_P(SettledPixels, SquaresThatAreAskedForAreDrawnAsTheWholeTileIs) {
     const Squares asked = 0x00'18'3c'00'81'00'ff'01u;
     int compared = 0, differing = 0;
-    for (int tile = 0; tile < frame.tilesX * frame.tilesY; tile += 5) {
+    for (int tile = 0; tile < frame.tiles.count(); tile += 5) {
         const DrawnTile middles(frame, tile, kMiddles, {kAllSquares, true, {}});
         const DrawnTile whole(frame, tile, kAll);
         const DrawnTile some(frame, tile, kAll, {asked, false, {}}, &middles);

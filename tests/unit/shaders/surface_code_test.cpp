@@ -208,7 +208,8 @@ struct Inputs {
         for (std::size_t i = 0; i < sources().size(); ++i)
             locals.push_back({&sources()[i], warps[i], samples[i].data(), unwarps[i]});
         core = seed / 2 % 2 == 1 ? 2 : kSources;
-        fuseTile(locals, grid, space.axis, corner.x, corner.y, kTile, kTile, pieces, nullptr, core);
+        fuseTile(locals, grid, space.axis, corner.x, corner.y, pixelsInFrame(0, 0, kTile, kTile),
+                 pieces, core);
     }
 
     [[nodiscard]] static glm::ivec2 first(int tile) {

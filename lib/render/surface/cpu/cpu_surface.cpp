@@ -67,10 +67,11 @@ class GroupDrawer {
     /// The tiles of the group in which some source may have something.
     void listTiles() {
         tiles_.clear();
-        const int x0 = firstTile_ % frame_->tilesX, y0 = firstTile_ / frame_->tilesX;
-        for (int y = y0; y < std::min(y0 + kGroupTiles, frame_->tilesY); ++y) {
-            for (int x = x0; x < std::min(x0 + kGroupTiles, frame_->tilesX); ++x) {
-                const int tile = y * frame_->tilesX + x;
+        const glm::ivec2 size = frame_->tiles.size;
+        const int x0 = firstTile_ % size.x, y0 = firstTile_ / size.x;
+        for (int y = y0; y < std::min(y0 + kGroupTiles, size.y); ++y) {
+            for (int x = x0; x < std::min(x0 + kGroupTiles, size.x); ++x) {
+                const int tile = y * size.x + x;
                 if (std::ranges::any_of(frame_->sourcesOf(tile),
                                         [&](int k) { return !sourceAt(k).blocksOf(tile).empty(); }))
                     tiles_.push_back(tile);
@@ -151,8 +152,8 @@ class GroupDrawer {
 
     /// Gives each source of the tile its samples in the middles of the group.
     void takeMiddles() {
-        const int x = frame_->tileX(tile_) - frame_->tileX(firstTile_);
-        const int y = frame_->tileY(tile_) - frame_->tileY(firstTile_);
+        const int x = frame_->tiles.x(tile_) - frame_->tiles.x(firstTile_);
+        const int y = frame_->tiles.y(tile_) - frame_->tiles.y(firstTile_);
         const auto corner = static_cast<std::size_t>(y * kGroupMiddles.stride() + x);
         for (std::size_t k = 0; k < chosen_->size(); ++k) {
             const auto place =
@@ -168,8 +169,8 @@ class GroupDrawer {
     void drawSources(Squares squares) {
         const std::size_t room = grid().count();
         samples_.resize(std::max(samples_.size(), room * chosen_->size()));
-        const int x = frame_->tileX(tile_) - frame_->tileX(firstTile_) + kMiddles.apron;
-        const int y = frame_->tileY(tile_) - frame_->tileY(firstTile_) + kMiddles.apron;
+        const int x = frame_->tiles.x(tile_) - frame_->tiles.x(firstTile_) + kMiddles.apron;
+        const int y = frame_->tiles.y(tile_) - frame_->tiles.y(firstTile_) + kMiddles.apron;
         for (std::size_t k = 0; k < chosen_->size(); ++k) {
             const int number = (*chosen_)[k];
             const GroupSource& g =
@@ -191,28 +192,28 @@ class GroupDrawer {
     void makePieces(int width, int height) {
         pieces_.clear();
         const DepthAxis& axis = frame_->space.axis;
-        const int tileX = frame_->tileX(tile_), tileY = frame_->tileY(tile_);
-        const int columns = std::min(kTile, width - tileX), rows = std::min(kTile, height - tileY);
+        const int tileX = frame_->tiles.x(tile_), tileY = frame_->tiles.y(tile_);
+        const TilePixels inside = pixelsInFrame(tileX, tileY, width, height);
         const int core = frame_->tileCore[static_cast<std::size_t>(tile_)];
         if (!frame_->effort.settle) {
             drawSources(kAllSquares);
-            fuseTile(local_, grid(), axis, tileX, tileY, columns, rows, pieces_, nullptr, core);
+            fuseTile(local_, grid(), axis, tileX, tileY, inside, pieces_, core);
             return;
         }
         // Where one sample in the middle does not settle a pixel, all of them are drawn.
         takeMiddles();
-        const TilePixels open = fuseSettled(local_, kGroupMiddles, axis, tileX, tileY, columns,
-                                            rows, frame_->effort.samplesPerPixel, pieces_);
+        const TilePixels open = fuseSettled(local_, kGroupMiddles, axis, tileX, tileY, inside,
+                                            frame_->effort.samplesPerPixel, pieces_);
         if (const Squares squares = squaresOf(open)) {
             drawSources(squares);
-            fuseTile(local_, grid(), axis, tileX, tileY, columns, rows, pieces_, &open, core);
+            fuseTile(local_, grid(), axis, tileX, tileY, open, pieces_, core);
         }
     }
 
     /// Adds the colours of the pieces, each by its share of the pixel. The depth and the origin of
     /// a pixel are those of its largest piece.
     void addPiecesTo(DrawnFrame& out) const {
-        const int tileX = frame_->tileX(tile_), tileY = frame_->tileY(tile_);
+        const int tileX = frame_->tiles.x(tile_), tileY = frame_->tiles.y(tile_);
         std::array<float, kTile * kTile> mainShare{};
         for (std::size_t i = 0; i < pieces_.size(); ++i) {
             const int x = tileX + pieces_.pixel[i] % kTile, y = tileY + pieces_.pixel[i] / kTile;
@@ -260,14 +261,14 @@ class CpuSurfaceBackend final : public SurfaceBackend {
         return {};
     }
     Result<void> finish(DrawnFrame out) override {
-        const int columns = (frame_->tilesX + kGroupTiles - 1) / kGroupTiles;
-        const int rows = (frame_->tilesY + kGroupTiles - 1) / kGroupTiles;
+        const int columns = (frame_->tiles.size.x + kGroupTiles - 1) / kGroupTiles;
+        const int rows = (frame_->tiles.size.y + kGroupTiles - 1) / kGroupTiles;
         parallelFor(0, static_cast<std::int64_t>(columns) * rows, [&](std::int64_t group) {
             if (job_.cancelled || frame_->sources.empty()) return;
             static thread_local GroupDrawer drawer;
             const int column = static_cast<int>(group) % columns;
             const int row = static_cast<int>(group) / columns;
-            drawer.draw(*frame_, kGroupTiles * (row * frame_->tilesX + column), out);
+            drawer.draw(*frame_, kGroupTiles * (row * frame_->tiles.size.x + column), out);
             frame_->sources.front().source->set->settle();
         });
         return {};

@@ -160,7 +160,7 @@ struct Fuser : Votes {
         return true;
     }
 
-    void fuseRow(int row, int columns, std::uint32_t wanted, int core, Pieces& pieces) {
+    void fuseRow(int row, std::uint32_t wanted, int core, Pieces& pieces) {
         RowRanges ranges;
         std::array<int, kMostTileSources> list;  // sources that have something there
         int count = 0;
@@ -178,8 +178,8 @@ struct Fuser : Votes {
                              std::lower_bound(there.begin(), there.end(), core) - there.begin())};
         const auto all = static_cast<uint>(locals.size());
         const bool twice = core < static_cast<int>(all);
-        for (int column = 0; column < columns; ++column) {
-            if (!(wanted >> column & 1)) continue;
+        for (std::uint32_t left = wanted; left; left &= left - 1) {
+            const int column = std::countr_zero(left);
             const std::size_t before = pieces.size();
             if (!fusePixel(ranges, there, column, row, 1.0f, pieces) || !twice) continue;
             for (std::size_t i = before; i < pieces.size(); ++i) pieces.share[i] *= kAllShare;
@@ -192,6 +192,15 @@ struct Fuser : Votes {
 
 }  // namespace
 }  // namespace shared
+
+TilePixels pixelsInFrame(int tileX, int tileY, int width, int height) {
+    const auto bitsBelow = [](int n) { return n >= kTile ? ~0u : (1u << std::max(n, 0)) - 1; };
+    TilePixels pixels{};
+    const std::uint32_t row = bitsBelow(width - tileX) & ~bitsBelow(-tileX);
+    for (int y = std::max(-tileY, 0); y < std::min(kTile, height - tileY); ++y)
+        pixels[static_cast<std::size_t>(y)] = row;
+    return pixels;
+}
 
 void Pieces::clear() {
     x.clear();
@@ -227,33 +236,29 @@ void Pieces::add(const Piece& piece, float of) {
 }
 
 void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, const DepthAxis& axis,
-              int tileX, int tileY, int columns, int rows, Pieces& pieces, const TilePixels* wanted,
-              int core) {
+              int tileX, int tileY, const TilePixels& wanted, Pieces& pieces, int core) {
     shared::Fuser fuser(sources, grid, axis, tileX, tileY);
-    for (int row = 0; row < rows; ++row) {
-        const std::uint32_t some = wanted ? (*wanted)[static_cast<std::size_t>(row)] : ~0u;
-        if (some) fuser.fuseRow(row, columns, some, core, pieces);
-    }
+    for (int row = 0; row < kTile; ++row)
+        if (const std::uint32_t some = wanted[static_cast<std::size_t>(row)])
+            fuser.fuseRow(row, some, core, pieces);
 }
 
 TilePixels fuseSettled(std::span<const LocalSource> sources, const SampleGrid& grid,
-                       const DepthAxis& axis, int tileX, int tileY, int columns, int rows,
+                       const DepthAxis& axis, int tileX, int tileY, const TilePixels& wanted,
                        int perPixel, Pieces& pieces) {
     static thread_local TileMiddles middles;
     // The first pixel of its rows belongs to the apron.
     shared::Fuser fuser(sources, grid, axis, tileX - kMiddles.apron, tileY - kMiddles.apron);
     settlePixels(sources, grid.stride(), axis, fuser.tile.step, perPixel, middles);
-    const std::uint32_t inside = columns == kTile ? ~0u : (1u << columns) - 1;
     TilePixels open{};
     std::size_t next = pieces.size(), most = next;
-    for (int row = 0; row < rows; ++row)
-        most += static_cast<std::size_t>(
-            std::popcount(middles.settled[static_cast<std::size_t>(row)] & inside));
+    for (std::size_t row = 0; row < kTile; ++row)
+        most += static_cast<std::size_t>(std::popcount(middles.settled[row] & wanted[row]));
     pieces.resize(most);
-    for (int row = 0; row < rows; ++row) {
+    for (int row = 0; row < kTile; ++row) {
         const auto r = static_cast<std::size_t>(row), y = r + kMiddles.apron;
-        const std::uint32_t settled = middles.settled[r] & inside;
-        open[r] = ~(settled | middles.empty[r]) & inside;
+        const std::uint32_t settled = middles.settled[r] & wanted[r];
+        open[r] = ~(settled | middles.empty[r]) & wanted[r];
         std::uint32_t alone = 0;
         for (std::size_t x = 0; x < kTile; ++x)
             alone |= (middles.alone[y][x + kMiddles.apron] ? 1u : 0u) << x;

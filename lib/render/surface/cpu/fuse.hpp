@@ -29,20 +29,22 @@ struct Pieces {
 /// Some pixels of a tile: bit x of row y.
 using TilePixels = std::array<std::uint32_t, kTile>;
 
+/// Those of the tile whose first pixel is (tileX, tileY) that are in a frame of this size.
+[[nodiscard]] TilePixels pixelsInFrame(int tileX, int tileY, int width, int height);
+
 /// Decides what each pixel of a tile shows: fuses the surfaces of the sources, checked against what
 /// the others see. At most 32 sources, at most 4 samples a side. Pixels that are not simple (see
 /// shaders/shared/surface_fuse.glsl) are the mean of that and of what the first `core` sources
-/// show. Of `wanted` pixels only, if given; samples of others need not be there, except beside
-/// those.
+/// show. Of `wanted` pixels only; samples of others need not be there, except beside those.
 void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, const DepthAxis& axis,
-              int tileX, int tileY, int columns, int rows, Pieces& pieces,
-              const TilePixels* wanted = nullptr, int core = kMostTileSources);
+              int tileX, int tileY, const TilePixels& wanted, Pieces& pieces,
+              int core = kMostTileSources);
 
-/// Adds the pieces of the pixels that one sample in their middle settles; `sources` have samples
-/// of such a grid, the tile's first pixel after the apron (see settlePixels()). Returns the other
-/// pixels, where that does not tell; those would get `perPixel` samples a side.
+/// Adds the pieces of those `wanted` pixels that one sample in their middle settles; `sources` have
+/// samples of such a grid, the tile's first pixel after the apron (see settlePixels()). Returns the
+/// others, where that does not tell; those would get `perPixel` samples a side.
 [[nodiscard]] TilePixels fuseSettled(std::span<const LocalSource> sources, const SampleGrid& grid,
-                                     const DepthAxis& axis, int tileX, int tileY, int columns,
-                                     int rows, int perPixel, Pieces& pieces);
+                                     const DepthAxis& axis, int tileX, int tileY,
+                                     const TilePixels& wanted, int perPixel, Pieces& pieces);
 
 }  // namespace stx::surface

@@ -169,7 +169,7 @@ Result<void> GpuSurfaceBackend::prepare(const SurfaceScene& scene, const surface
 }
 
 std::vector<TilePlan> GpuSurfaceBackend::planTiles(const SurfaceFrame& work) const {
-    std::vector<TilePlan> plans(static_cast<std::size_t>(work.tilesX) * work.tilesY);
+    std::vector<TilePlan> plans(static_cast<std::size_t>(work.tiles.count()));
     parallelFor(0, static_cast<std::int64_t>(plans.size()), [&](std::int64_t i) {
         TilePlan& plan = plans[static_cast<std::size_t>(i)];
         plan.tile = static_cast<int>(i);
@@ -243,8 +243,8 @@ Batch GpuSurfaceBackend::fillBatch(const SurfaceFrame& work,
             ++slot;
         }
         batch.tiles[static_cast<std::size_t>(i)] = {
-            plan.tile % work.tilesX * kTile,
-            plan.tile / work.tilesX * kTile,
+            work.tiles.x(plan.tile),
+            work.tiles.y(plan.tile),
             plan.firstLocal,
             static_cast<std::uint32_t>(plan.sources.size()),
             step,
@@ -404,16 +404,16 @@ Result<void> GpuSurfaceBackend::collect(const SurfaceFrame& work, Returned& back
     const auto* origin = reinterpret_cast<const glm::vec4*>(memory + 20 * pixels);
     parallelFor(0, static_cast<std::int64_t>(back.tiles.size()), [&](std::int64_t i) {
         const int tile = back.tiles[static_cast<std::size_t>(i)].tile;
-        const int x0 = tile % work.tilesX * kTile, y0 = tile / work.tilesX * kTile;
-        const int columns = std::min(kTile, out.q.width() - x0);
-        const int rows = std::min(kTile, out.q.height() - y0);
-        for (int y = 0; y < rows; ++y) {
-            const std::int64_t from = i * kTilePixels + static_cast<std::int64_t>(y) * kTile;
-            std::copy_n(colour + from, columns, out.colour.row(y0 + y).data() + x0);
-            std::copy_n(depth + from, columns, out.q.row(y0 + y).data() + x0);
+        const int tileX = work.tiles.x(tile), tileY = work.tiles.y(tile);
+        const int x0 = std::max(tileX, 0), columns = std::min(tileX + kTile, out.q.width()) - x0;
+        for (int y = std::max(tileY, 0); y < std::min(tileY + kTile, out.q.height()); ++y) {
+            const std::int64_t from = i * kTilePixels +
+                                      static_cast<std::int64_t>(y - tileY) * kTile + x0 - tileX;
+            std::copy_n(colour + from, columns, out.colour.row(y).data() + x0);
+            std::copy_n(depth + from, columns, out.q.row(y).data() + x0);
             if (!work.wantOrigin) continue;
             for (int x = 0; x < columns; ++x)
-                out.origin.at(x0 + x, y0 + y) = glm::vec3(origin[from + x]);
+                out.origin.at(x0 + x, y) = glm::vec3(origin[from + x]);
         }
     });
     return {};

@@ -106,20 +106,19 @@ struct Corners {
 struct Placer {
     const Source& source;
     Warp warp;
-    float limitX, limitY;
+    glm::vec2 first, limit;  ///< where the tiles begin and how far they reach from there, pixels
 
-    Placer(const FrameSource& f, const PixelSpace& space)
+    Placer(const FrameSource& f, const TileGrid& tiles)
         : source(*f.source),
           warp(warpFrom(f.pixelFromSource)),
-          limitX(static_cast<float>(space.camera.width)),
-          limitY(static_cast<float>(space.camera.height)) {}
+          first(tiles.first),
+          limit(tiles.size * kTile) {}
 
     struct Placed {
         TileRange tiles;
         bool partlyBehind;
     };
-    /// The tiles that `side` x `side` pixels from (x, y) on may be drawn in; nothing where they are
-    /// not in the frame.
+    /// The tiles that `side` x `side` pixels from (x, y) on may be drawn in, if any.
     [[nodiscard]] std::optional<Placed> place(const BlockRange& range, int x, int y,
                                               int side) const {
         const float margin = kBlockMargin * range.reach +
@@ -131,8 +130,10 @@ struct Placer {
         if (!(most > 0)) return std::nullopt;
         const bool behind = !(least > 0);
         const auto box = behind ? corners.inFront(kNearestShare * most) : corners.all();
-        const float x0 = std::max(box.x0 - 0.5f, 0.0f), x1 = std::min(box.x1 + 0.5f, limitX - 0.5f);
-        const float y0 = std::max(box.y0 - 0.5f, 0.0f), y1 = std::min(box.y1 + 0.5f, limitY - 0.5f);
+        const float x0 = std::max(box.x0 - first.x - 0.5f, 0.0f);
+        const float x1 = std::min(box.x1 - first.x + 0.5f, limit.x - 0.5f);
+        const float y0 = std::max(box.y0 - first.y - 0.5f, 0.0f);
+        const float y1 = std::min(box.y1 - first.y + 0.5f, limit.y - 0.5f);
         if (!(x0 <= x1 && y0 <= y1)) return std::nullopt;
         return Placed{{static_cast<int>(x0) / kTile, static_cast<int>(y0) / kTile,
                        static_cast<int>(x1) / kTile, static_cast<int>(y1) / kTile},
@@ -169,8 +170,8 @@ glm::dvec4 eyeIn(const Source& s, const Camera& camera) {
                                                          : glm::dvec4(camera.position, 1.0));
 }
 
-std::vector<PlacedBlocks> placedBlocks(const FrameSource& f, const PixelSpace& space) {
-    const Placer placer(f, space);
+std::vector<PlacedBlocks> placedBlocks(const FrameSource& f, const TileGrid& tiles) {
+    const Placer placer(f, tiles);
     std::vector<PlacedBlocks> all;
     const auto add = [&](const Placer::Placed& at, const glm::dvec4& h, std::uint32_t begin,
                          std::uint32_t end) {
@@ -195,9 +196,9 @@ std::vector<PlacedBlocks> placedBlocks(const FrameSource& f, const PixelSpace& s
     return all;
 }
 
-void placeBlocks(FrameSource& f, const PixelSpace& space, int tilesX, int tilesY) {
+void placeBlocks(FrameSource& f, const PixelSpace& space, const TileGrid& tiles) {
     const Source& s = *f.source;
-    const Placer placer(f, space);
+    const Placer placer(f, tiles);
     const glm::dvec4 eye = eyeIn(s, space.camera);
     f.turnedAway.assign(s.blocks.size(), 0);
     struct Range {
@@ -205,10 +206,11 @@ void placeBlocks(FrameSource& f, const PixelSpace& space, int tilesX, int tilesY
         TileRange tiles;
     };
     std::vector<Range> ranges;
-    f.tileBegin.assign(static_cast<std::size_t>(tilesX) * tilesY + 1, 0);
+    f.tileBegin.assign(static_cast<std::size_t>(tiles.count()) + 1, 0);
     const auto forTiles = [&](const TileRange& r, const auto& visit) {
         for (int y = r.y0; y <= r.y1; ++y)
-            for (int x = r.x0; x <= r.x1; ++x) visit(static_cast<std::size_t>(y * tilesX + x));
+            for (int x = r.x0; x <= r.x1; ++x)
+                visit(static_cast<std::size_t>(y * tiles.size.x + x));
     };
     for (const std::uint32_t number : s.planned) {
         const BlockRange& block = s.blocks[number];

@@ -25,9 +25,9 @@ struct PlacedBlocks {
 [[nodiscard]] glm::dvec4 eyeIn(const Source& s, const Camera& camera);
 
 /// Where all blocks of a source fall, in few pieces.
-[[nodiscard]] std::vector<PlacedBlocks> placedBlocks(const FrameSource& f, const PixelSpace& space);
+[[nodiscard]] std::vector<PlacedBlocks> placedBlocks(const FrameSource& f, const TileGrid& tiles);
 
-/// Fills the blocks of a source in a frame of so many tiles.
-void placeBlocks(FrameSource& f, const PixelSpace& space, int tilesX, int tilesY);
+/// Fills the blocks of a source in a frame of these tiles.
+void placeBlocks(FrameSource& f, const PixelSpace& space, const TileGrid& tiles);
 
 }  // namespace stx::surface

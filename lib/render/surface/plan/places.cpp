@@ -31,11 +31,10 @@ struct ShownPlace {
 /// The nearest places of a frame, by cell.
 class Nearest {
   public:
-    explicit Nearest(const Camera& camera)
-        : columns_(camera.width / kCell + 1),
-          q_(static_cast<std::size_t>(columns_) *
-                 static_cast<std::size_t>(camera.height / kCell + 1),
-             0.0f) {}
+    explicit Nearest(const TileGrid& tiles)
+        : first_(tiles.first),
+          columns_(tiles.size.x * kTile / kCell),
+          q_(static_cast<std::size_t>(tiles.count()) * (kTile / kCell) * (kTile / kCell), 0.0f) {}
     void add(float x, float y, float q) {
         float& most = q_[cellOf(x, y)];
         most = std::max(most, q);
@@ -51,9 +50,10 @@ class Nearest {
 
   private:
     [[nodiscard]] std::size_t cellOf(float x, float y) const {
-        return static_cast<std::size_t>(static_cast<int>(y) / kCell * columns_ +
-                                        static_cast<int>(x) / kCell);
+        const glm::ivec2 cell = glm::ivec2(glm::vec2(x, y) - glm::vec2(first_)) / kCell;
+        return static_cast<std::size_t>(cell.y * columns_ + cell.x);
     }
+    glm::ivec2 first_;
     int columns_;
     std::vector<float> q_;
 };
@@ -65,8 +65,8 @@ class PlacesOf {
         : source_(*f.source),
           warp_(warpFrom(f.pixelFromSource)),
           eye_(eyeIn(*f.source, frame.space.camera)),
-          width_(static_cast<float>(frame.space.camera.width)),
-          height_(static_cast<float>(frame.space.camera.height)),
+          first_(frame.tiles.first),
+          end_(frame.tiles.first + frame.tiles.size * kTile),
           qLimit_(frame.qLimit()) {}
 
     /// Calls visit(x, y, q, rise) for those of some blocks that face the camera, about so many
@@ -128,7 +128,8 @@ class PlacesOf {
                 const glm::vec4 h = warp_.homogeneous(u, v, q);
                 if (!(h.w > 0)) continue;
                 const glm::vec3 at = glm::vec3(h) / h.w;
-                if (!(at.x >= 0 && at.y >= 0 && at.x < width_ && at.y < height_ && at.z < qLimit_))
+                if (!(at.x >= first_.x && at.y >= first_.y && at.x < end_.x && at.y < end_.y &&
+                      at.z < qLimit_))
                     continue;
                 const glm::vec2 slope = gradientFrom(texels.q + texel, texels.info + texel, 1,
                                                      texels.stride, x0 + i > 0, y0 + j > 0);
@@ -143,8 +144,9 @@ class PlacesOf {
 
     const Source& source_;
     Warp warp_;
-    glm::vec4 eye_;  ///< the frame's, see eyeIn()
-    float width_, height_, qLimit_;
+    glm::vec4 eye_;          ///< the frame's, see eyeIn()
+    glm::vec2 first_, end_;  ///< of the tiles, pixels
+    float qLimit_;
 };
 
 /// Whether a source shows the surface at a place of the frame: by the pixel that it falls in.
@@ -208,17 +210,17 @@ void addSourcesOfPlaces(SurfaceFrame& frame, std::span<const std::vector<PlacedB
         static_cast<double>(camera.width) * camera.height * static_cast<double>(count);
     const double apart = std::min(std::sqrt(all / kMostPlaces), kFarthestApart);
     const auto tileOf = [&](float x, float y) {
-        return static_cast<std::size_t>(static_cast<int>(y) / kTile * frame.tilesX +
-                                        static_cast<int>(x) / kTile);
+        return static_cast<std::size_t>(
+            frame.tiles.at({static_cast<int>(std::floor(x)), static_cast<int>(std::floor(y))}));
     };
-    Nearest nearest(camera);
+    Nearest nearest(frame.tiles);
     std::mutex mutex;
     // For each source, its places in tiles that are not built from it.
     std::vector<std::vector<ShownPlace>> others(frame.sources.size());
     parallelFor(0, count, [&](std::int64_t i) {
         const auto k = static_cast<std::size_t>(i);
         const PlacesOf places(frame.sources[k], frame);
-        Nearest own(camera);
+        Nearest own(frame.tiles);
         for (const PlacedBlocks& blocks : placed[k]) {
             places.visit(blocks, apart, [&](float x, float y, float q, const auto& rise) {
                 own.add(x, y, q);

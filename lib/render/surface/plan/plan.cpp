@@ -21,13 +21,14 @@ std::vector<double> middlesOf(const SurfaceFrame& frame,
         int blocks = 0;
     };
     // Blocks that are partly behind the camera count only in tiles that have no others.
-    const std::size_t tiles = static_cast<std::size_t>(frame.tilesX) * frame.tilesY;
+    const std::size_t tiles = static_cast<std::size_t>(frame.tiles.count());
     std::vector<std::array<Sum, 2>> sums(tiles);
     for (const auto& ofSource : placed) {
         for (const PlacedBlocks& p : ofSource) {
             for (int y = p.tiles.y0; y <= p.tiles.y1; ++y) {
                 for (int x = p.tiles.x0; x <= p.tiles.x1; ++x) {
-                    Sum& sum = sums[static_cast<std::size_t>(y * frame.tilesX + x)][p.partlyBehind];
+                    Sum& sum =
+                        sums[static_cast<std::size_t>(y * frame.tiles.size.x + x)][p.partlyBehind];
                     const auto count = static_cast<int>(p.end - p.begin);
                     sum.q += p.q * count;
                     sum.blocks += count;
@@ -47,7 +48,7 @@ std::vector<double> middlesOf(const SurfaceFrame& frame,
 std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q, int wanted) {
     const glm::dvec4 h =
         frame.space.worldFromPixel *
-        glm::dvec4(frame.tileX(tile) + kTile * 0.5, frame.tileY(tile) + kTile * 0.5, q, 1.0);
+        glm::dvec4(frame.tiles.x(tile) + kTile * 0.5, frame.tiles.y(tile) + kTile * 0.5, q, 1.0);
     const glm::dvec3 point = glm::dvec3(h) / h.w;
     const auto towards = [&](const Camera& c) {
         return c.orthographic ? c.forward() : glm::normalize(point - c.position);
@@ -135,7 +136,7 @@ std::vector<const Source*> sourcesBySide(const SurfaceScene& scene, const Bounds
 void placeAll(SurfaceFrame& frame, const std::vector<char>& wanted) {
     parallelFor(0, static_cast<std::int64_t>(wanted.size()), [&](std::int64_t i) {
         const auto k = static_cast<std::size_t>(i);
-        if (wanted[k]) placeBlocks(frame.sources[k], frame.space, frame.tilesX, frame.tilesY);
+        if (wanted[k]) placeBlocks(frame.sources[k], frame.space, frame.tiles);
     });
 }
 
@@ -193,11 +194,21 @@ Effort effortOf(const RenderSettings& settings, const SurfaceScene& scene) {
     return e;
 }
 
+TileGrid::TileGrid(const Camera& camera) {
+    const auto along = [](double principal, int pixels, int& begin, int& count) {
+        const double whole = std::floor(principal);
+        begin = static_cast<int>(whole - kTile * std::ceil(whole / kTile));
+        count = (pixels - begin + kTile - 1) / kTile;
+    };
+    along(camera.cx, camera.width, first.x, size.x);
+    along(camera.cy, camera.height, first.y, size.y);
+}
+
 glm::dmat4 SurfaceFrame::sampleFromPixel(int tile, int perPixel, int apron) const {
     glm::dmat4 m(1.0);
     m[0][0] = m[1][1] = perPixel;
-    m[3][0] = -(tileX(tile) - apron) * perPixel - 0.5;
-    m[3][1] = -(tileY(tile) - apron) * perPixel - 0.5;
+    m[3][0] = -(tiles.x(tile) - apron) * perPixel - 0.5;
+    m[3][1] = -(tiles.y(tile) - apron) * perPixel - 0.5;
     return m;
 }
 
@@ -225,12 +236,11 @@ SurfaceFrame planFrame(const SurfaceScene& scene, const Bounds& bounds, const Ef
             glm::dot(bounds.centre() - camera.position, camera.forward()) + bounds.radius());
     SurfaceFrame f;
     f.space = PixelSpace(camera, farthest);
-    f.tilesX = (camera.width + kTile - 1) / kTile;
-    f.tilesY = (camera.height + kTile - 1) / kTile;
+    f.tiles = TileGrid(camera);
     f.effort = effort;
     for (const Source* s : sourcesBySide(scene, bounds, camera))
         f.sources.push_back(sourceIn(f.space, *s));
-    const std::size_t tiles = static_cast<std::size_t>(f.tilesX) * f.tilesY;
+    const std::size_t tiles = static_cast<std::size_t>(f.tiles.count());
     f.tileSources.resize(tiles);
     const bool all = static_cast<int>(f.sources.size()) <= effort.mostGeometry;
     if (all || effort.preferShown) placeAll(f, std::vector<char>(f.sources.size(), 1));
@@ -248,7 +258,7 @@ SurfaceFrame planFrame(const SurfaceScene& scene, const Bounds& bounds, const Ef
     std::vector<std::vector<PlacedBlocks>> placed(f.sources.size());
     parallelFor(0, static_cast<std::int64_t>(placed.size()), [&](std::int64_t i) {
         const auto k = static_cast<std::size_t>(i);
-        placed[k] = placedBlocks(f.sources[k], f.space);
+        placed[k] = placedBlocks(f.sources[k], f.tiles);
     });
     const std::vector<double> middles = middlesOf(f, placed);
     parallelFor(0, static_cast<std::int64_t>(tiles), [&](std::int64_t i) {

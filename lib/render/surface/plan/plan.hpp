@@ -62,11 +62,28 @@ struct FrameSource {
     }
 };
 
-/// A frame to draw: tiles of kTile x kTile pixels, row by row.
+/// The tiles of a frame, of kTile x kTile pixels, row by row. One begins at the principal point: a
+/// part of a frame has the tiles of the whole, which choose the same sources.
+struct TileGrid {
+    glm::ivec2 first{0};  ///< first pixel of the first tile: -kTile + 1 to 0
+    glm::ivec2 size{0};   ///< tiles
+    explicit TileGrid(const Camera& camera);
+    TileGrid() = default;
+    [[nodiscard]] int count() const { return size.x * size.y; }
+    /// The first pixel of a tile; those of the first ones may lie before the frame.
+    [[nodiscard]] int x(int tile) const { return first.x + tile % size.x * kTile; }
+    [[nodiscard]] int y(int tile) const { return first.y + tile / size.x * kTile; }
+    [[nodiscard]] int at(glm::ivec2 pixel) const {
+        const glm::ivec2 tile = (pixel - first) / kTile;
+        return tile.y * size.x + tile.x;
+    }
+};
+
+/// A frame to draw.
 struct SurfaceFrame {
     PixelSpace space;
     std::vector<FrameSource> sources;
-    int tilesX = 0, tilesY = 0;
+    TileGrid tiles;
     /// By tile: the sources that it is built from, at most kMostTileSources; none where no source
     /// has anything.
     std::vector<std::vector<int>> tileSources;
@@ -76,8 +93,6 @@ struct SurfaceFrame {
     Effort effort;
     bool wantOrigin = false;  ///< see DrawnFrame::origin
 
-    [[nodiscard]] int tileX(int tile) const { return tile % tilesX * kTile; }
-    [[nodiscard]] int tileY(int tile) const { return tile / tilesX * kTile; }
     [[nodiscard]] const std::vector<int>& sourcesOf(int tile) const {
         return tileSources[static_cast<std::size_t>(tile)];
     }
