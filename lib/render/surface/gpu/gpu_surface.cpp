@@ -407,8 +407,8 @@ Result<void> GpuSurfaceBackend::collect(const SurfaceFrame& work, Returned& back
         const int tileX = work.tiles.x(tile), tileY = work.tiles.y(tile);
         const int x0 = std::max(tileX, 0), columns = std::min(tileX + kTile, out.q.width()) - x0;
         for (int y = std::max(tileY, 0); y < std::min(tileY + kTile, out.q.height()); ++y) {
-            const std::int64_t from = i * kTilePixels +
-                                      static_cast<std::int64_t>(y - tileY) * kTile + x0 - tileX;
+            const std::int64_t from =
+                i * kTilePixels + static_cast<std::int64_t>(y - tileY) * kTile + x0 - tileX;
             std::copy_n(colour + from, columns, out.colour.row(y).data() + x0);
             std::copy_n(depth + from, columns, out.q.row(y).data() + x0);
             if (!work.wantOrigin) continue;

@@ -12,8 +12,8 @@ namespace stx::surface {
 namespace {
 
 constexpr int kCells = ViewSummary::kCells;
-/// A picture is taken for larger by so much on each side, pixels: tiles reach beyond it by less than
-/// kTile, and the boxes that blocks are placed by beyond these by half a pixel and rounding.
+/// A picture is taken for larger by so much on each side, pixels: tiles reach beyond it by less
+/// than kTile, and the boxes that blocks are placed by beyond these by half a pixel and rounding.
 constexpr double kAroundPicture = kTile + 4;
 /// Splats reach farther, and quarters of blocks are left out where others show all of their points:
 /// this share of the picture, too.
