@@ -84,6 +84,30 @@ NaiveWarp warpOfAll(const Bundle& bundle, const Camera& to, double texel) {
     return out;
 }
 
+/// Takes out of `judged` the pixels that show the surface where no recorded view has a point. A warp
+/// that fills whole texels covers them, too, beside those that have one.
+void keepKnown(const Captured& captured, const Bundle& recorded, Image<std::uint8_t>& judged) {
+    const auto hasPointAt = [&](std::size_t i, const glm::dvec3& world) {
+        const Camera& camera = captured.bundle.views[i].camera;
+        const glm::dvec3 p(camera.cameraFromWorld() * glm::dvec4(world, 1));
+        if (!(p.z < 0)) return false;
+        const glm::ivec2 at(glm::floor(glm::dvec2(camera.project(p))));
+        const Image<float>& depth = recorded.views[i].depth;
+        return depth.contains(at.x, at.y) && hasPoint(depth.at(at.x, at.y));
+    };
+    for (int y = 0; y < judged.height(); ++y) {
+        for (int x = 0; x < judged.width(); ++x) {
+            if (!judged.at(x, y)) continue;
+            const Hit hit = captured.scene.trace(captured.novel, x + 0.5, y + 0.5);
+            if (!hit.any()) continue;
+            bool known = false;
+            for (std::size_t i = 0; i < recorded.views.size(); ++i)
+                known = known || hasPointAt(i, hit.point);
+            if (!known) judged.at(x, y) = 0;
+        }
+    }
+}
+
 }  // namespace
 
 namespace measures {
@@ -92,8 +116,8 @@ Outcome recordedBelowWarp(Pictures& pictures) {
     if (pictures.seenCount(1) < kFewest) return std::nullopt;
     const Recorded recorded(pictures);
     const Camera& novel = pictures.captured().novel;
-    const NaiveWarp warp =
-        warpOfAll(recorded.bundle, novel, pictures.captured().from.magnification);
+    NaiveWarp warp = warpOfAll(recorded.bundle, novel, pictures.captured().from.magnification);
+    keepKnown(pictures.captured(), recorded.bundle, warp.covered);
     Frame warped;
     warped.colour = Image<glm::vec4>(novel.width, novel.height, glm::vec4(0));
     for (std::size_t k = 0; k < warp.picture.count(); ++k) {
