@@ -23,8 +23,6 @@ bool showsPlane(const ReferenceView& view, glm::dvec3 point, glm::dvec3 normal) 
     const glm::dvec3 at = camera.project(local);
     const int x = static_cast<int>(std::floor(at.x)), y = static_cast<int>(std::floor(at.y));
     if (x < 2 || y < 2 || x >= camera.width - 2 || y >= camera.height - 2) return false;
-    // Steeper than this (72 degrees), a texel is more than three times as deep as wide.
-    constexpr double kGrazing = 0.3;
     if (-glm::dot(camera.viewDirection(at.x, at.y), normal) < kGrazing) return false;
     const double near = 0.5 * camera.sampleSpacing(at.z).x;
     for (int v = y - 1; v <= y + 1; ++v) {

@@ -24,6 +24,10 @@ struct Drawn {
     }
 };
 
+/// Cosine of the angle between a ray and a normal. Steeper than this (72 degrees), a texel is more
+/// than three times as deep as wide.
+constexpr double kGrazing = 0.3;
+
 /// Draws one picture without filling (what is filled in is a guess, which no rule can judge).
 /// `filled` draws it as users get it. Errors: those of the renderer.
 [[nodiscard]] stx::Result<stx::Frame> drawBundle(const stx::Bundle& bundle,
