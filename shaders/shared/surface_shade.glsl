@@ -4,7 +4,7 @@
 // Needs surface_votes.glsl. From outside: FrameEntry frame; SourceEntry sources[]; MOST, sources
 // that a piece takes colours from; int sourceOf(k), source k of the piece's tile; in a place
 //   float ownColourOf(s, place, i, j), how far from edges, 0 on creases, bool mixesColours(s, place, i, j), whether
-//   two surfaces have a part in the colour, of sources that lack points, and vec4 colourOf(s, place, i, j)
+//   two surfaces have a part in the colour, and vec4 colourOf(s, place, i, j); bool depthMayBeUnknown(s)
 // Taps tapPlaceOf(s, corner), a Place of 4x4 pixels around a point, and bool canRead(place, pixel) which of
 // them are there
 
@@ -90,8 +90,12 @@ uint tapsOnSurface(int s, Piece piece, SourceView view) {
     return taps;
 }
 
-// What tap t counts, of those that tapsOnSurface() gave.
-float shareOf(uint taps, int t) { return (taps >> (16 + t) & 1u) != 0u ? max(kMixedTap, frame.fit.w) : 1.0f; }
+// What a tap counts that mixes colours, see kMixedTap.
+float mixedTap(int s, SourceView view) {
+    float least = max(kMixedTap, frame.fit.w);
+    if (depthMayBeUnknown(s)) return least;
+    return clamp(1.0f / sqrt(max(abs(view.xu * view.yv - view.xv * view.yu), 1e-12f)), least, 1.0f);
+}
 
 // r² = x dx² + y dx dy + z dy² of offsets in the frame, 1 where the kernel ends. Its size is that of a
 // pixel of the frame, and by a share of kOwn that of a pixel of the source as the frame has it. The larger
@@ -204,11 +208,12 @@ vec4 shadePiece(Piece piece) {
         Taps place = tapPlaceOf(top[k], base);
         taps[k] = view.plain ? 0xffffu : tapsOnSurface(top[k], piece, view);
         bool weigh = !view.plain && hasAlpha(top[k]);
+        float mixed = mixedTap(top[k], view);
         vec3 metric = metricOf(view);
         for (int t = 0; t < 16; ++t) {
             if ((taps[k] >> t & 1u) == 0u) continue;
             Tap tap = tapOf(view, metric, base + ivec2(t % 4, t / 4));
-            float dx = tap.dx, dy = tap.dy, w = tap.weight * shareOf(taps[k], t);
+            float dx = tap.dx, dy = tap.dy, w = tap.weight * ((taps[k] >> (16 + t) & 1u) != 0u ? mixed : 1.0f);
             if (weigh) w *= alphaOf(top[k], place, t % 4, t / 4);
             float wx = w * dx, wy = w * dy, wxx = wx * dx, wyy = wy * dy;
             float xx = dx * dx, xy = dx * dy, yy = dy * dy;
@@ -242,13 +247,14 @@ vec4 shadePiece(Piece piece) {
         ivec2 base = firstTap(view);
         Taps place = tapPlaceOf(top[k], base);
         bool weigh = !view.plain && hasAlpha(top[k]);
+        float mixed = mixedTap(top[k], view);
         vec3 metric = metricOf(view);
         for (int t = 0; t < 16; ++t) {
             if ((taps[k] >> t & 1u) == 0u) continue;
             Tap tap = tapOf(view, metric, base + ivec2(t % 4, t / 4));
             float dx = tap.dx, dy = tap.dy;
             vec4 texel = colourOf(top[k], place, t % 4, t / 4);
-            float w = tap.weight * shareOf(taps[k], t) * (weigh ? texel.w : 1.0f);
+            float w = tap.weight * ((taps[k] >> (16 + t) & 1u) != 0u ? mixed : 1.0f) * (weigh ? texel.w : 1.0f);
             w *= row[0] + row[1] * dx + row[2] * dy + dx * (row[3] * dx + row[4] * dy) + row[5] * dy * dy;
             sum += w * vec3(texel);
             total += w;

@@ -111,8 +111,8 @@ float edgeDistanceOf(int s, Place p, int i, int j) {
 float ownColourOf(int s, Place p, int i, int j) {
     return (surfaceAt(s, p, i, j).w & kCreasePixel) != 0u ? 0.0f : edgeDistanceOf(s, p, i, j);
 }
+bool depthMayBeUnknown(int s) { return sources[s].place.w != 0; }
 bool mixesColours(int s, Place p, int i, int j) {
-    if (sources[s].place.w == 0) return false;
     uint code = surfaceAt(s, p, i, j).w;
     return (code & kCreasePixel) != 0u || (code & (kDistanceMask << kDistanceShift | kBesideBackground)) == 0u;
 }

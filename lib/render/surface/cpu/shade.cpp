@@ -155,9 +155,17 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
     weighEdges(edge, edgeWeight, out);
 }
 
+/// What a tap of lane `l` counts that mixes colours, see kMixedTap.
+HWY_INLINE float mixedTap(const Source& source, const GroupSource& view, int l, float edgeWeight) {
+    const float least = std::max(kMixedTap, edgeWeight);
+    if (source.view->depthMayBeUnknown()) return least;
+    const float area = std::abs(view.xu[l] * view.yv[l] - view.xv[l] * view.yu[l]);
+    return std::clamp(1.0f / std::sqrt(std::max(area, 1e-12f)), least, 1.0f);
+}
+
 /// 1 (or alpha) for taps on the surface of the piece, less where they mix its colours with others,
 /// 0 for taps elsewhere, of one lane; taps row by row, `out` aligned to a row. `mixed`: see
-/// kMixedTap.
+/// mixedTap().
 HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u, float v,
                          const GroupSource& view, int baseU, int baseV, float mixed,
                          float out[kTaps * kTaps]) {
@@ -342,7 +350,7 @@ HWY_INLINE void keepHeaviest(const Group& g, int most, GroupTaps& t) {
 }
 
 /// The first taps of a source, and which of them lie on the surface of their lane.
-HWY_INLINE void findTaps(const Group& g, const ShadeSource& source, int s, float mixed,
+HWY_INLINE void findTaps(const Group& g, const ShadeSource& source, int s, float edgeWeight,
                          GroupTaps& t) {
     const hn::ScalableTag<float> d;
     using V = hn::Vec<decltype(d)>;
@@ -360,7 +368,8 @@ HWY_INLINE void findTaps(const Group& g, const ShadeSource& source, int s, float
         if (l >= g.count || !(view.weight[l] > 0.0f)) continue;
         alignas(16) float mask[kTaps * kTaps];
         maskTaps(source, g, l, view.u[l], view.v[l], view, static_cast<int>(t.bases[s][0][l]),
-                 static_cast<int>(t.bases[s][1][l]), mixed, mask);
+                 static_cast<int>(t.bases[s][1][l]),
+                 mixedTap(*source.source, view, l, edgeWeight), mask);
         for (int i = 0; i < kTaps * kTaps; ++i) t.masks[s][i][l] = mask[i];
     }
 }
@@ -478,10 +487,7 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
     for (int k = 0; k < t.count; ++k) {
         const int s = t.list[k];
         const ShadeSource& source = sources[static_cast<std::size_t>(s)];
-        const float mixed = source.source->view->depthMayBeUnknown()
-                                ? std::max(kMixedTap, settings.edgeWeight)
-                                : 1.0f;
-        findTaps(g, source, s, mixed, t);
+        findTaps(g, source, s, settings.edgeWeight, t);
         if (t.views[s].narrow)
             addMoments<kNarrow>(s, settings.kernel, t, moments);
         else

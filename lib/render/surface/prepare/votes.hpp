@@ -89,9 +89,9 @@ struct SourcePixels {
         return static_cast<float>(
             Info::ownColour(static_cast<std::uint8_t>(at(s).infoAt(p.kept, i, j))));
     }
+    [[nodiscard]] bool depthMayBeUnknown(int s) const { return at(s).view->depthMayBeUnknown(); }
     [[nodiscard]] bool mixesColours(int s, const Place& p, int i, int j) const {
-        return at(s).view->depthMayBeUnknown() &&
-               Info::mixesColours(static_cast<std::uint8_t>(at(s).infoAt(p.kept, i, j)));
+        return Info::mixesColours(static_cast<std::uint8_t>(at(s).infoAt(p.kept, i, j)));
     }
     [[nodiscard]] static float relativeScale(Axis axis, float q) { return axis.relativeScale(q); }
     [[nodiscard]] static float qPerUnit(Axis axis, float q) { return axis.qPerUnit(q); }
