@@ -442,7 +442,7 @@ bool setOnDemand(FileKind kind, const Json& out, const Limits& limits) {
         bytes += each * static_cast<std::uint64_t>(std::max(view.value("width", 0), 0)) *
                  static_cast<std::uint64_t>(std::max(view.value("height", 0), 0));
     }
-    return out["views"].size() > 1 && bytes > heldOfSets(limits);
+    return out["views"].size() > 1 && bytes > heldWhole(limits);
 }
 
 /// What takes more than headers: what of the pixels was asked for.

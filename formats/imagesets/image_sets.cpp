@@ -272,7 +272,7 @@ class StillSet : public Sequence {
     }
     Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
         if (index > 0) return Sequence::views(index, job);
-        return tableOfViews(set_, where_, options_, heldOfSets(job.limits), job);
+        return tableOfViews(set_, where_, options_, heldWhole(job.limits), job);
     }
 
   private:
@@ -282,11 +282,6 @@ class StillSet : public Sequence {
 };
 
 }  // namespace
-
-std::uint64_t heldOfSets(const Limits& limits) {
-    constexpr std::uint64_t kMost = 64u << 20, kPartOfLimit = 8;
-    return std::min(kMost, limits.maxMemoryBytes / kPartOfLimit);
-}
 
 Result<SetDescription> imagesets::describeSet(const path& path, const ImageSetOptions& options,
                                               Job& job) {

@@ -68,6 +68,7 @@ class SetViews : public ViewTable, public ViewsLookedAt {
     std::uint64_t bytesToMake(std::size_t index) const override {
         return 2 * bytesOf(index) + kReadingTakes * pixelsOf(index);
     }
+    bool knownSound() const override { return true; }
     std::string where() const override { return where_; }
     const ColourPoints* colourPoints() const override {
         return looked_.points.empty() ? nullptr : &looked_.points;

@@ -9,9 +9,6 @@
 
 namespace stx {
 
-/// Images of a set that take no more than so many bytes are all in memory when it is opened as a
-/// table: that is faster than to read each picture twice, and hardly shows beside the program.
-[[nodiscard]] std::uint64_t heldOfSets(const Limits& limits);
 /// The views of readImageSet() as a table. Of a set of one moment whose images take more than
 /// `held` bytes, each view is read once here, for its planes and marks, and again when it is asked
 /// for; a file that changes meanwhile is an error (invalidInput). Views that are taken together are

@@ -75,6 +75,7 @@ class SpooledViews : private OwnSpool, public ViewTable {
 
     std::uint64_t bytesHeld() const override { return held_; }
     std::uint64_t bytesGiven(std::size_t) const override { return 0; }
+    bool knownSound() const override { return true; }
 
   protected:
     Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job&) const override {
@@ -120,6 +121,7 @@ class ChangedViews : public ViewTable {
         return change_.keepsPixels ? table_->summaries() : std::vector<ViewSummary>();
     }
     std::string where() const override { return table_->where(); }
+    bool knownSound() const override { return table_->knownSound(); }
     int mostAtOnce() const override { return table_->mostAtOnce(); }
 
   protected:
@@ -152,6 +154,7 @@ class WatchedViews : public ViewTable {
     }
     std::vector<ViewSummary> summaries() const override { return table_->summaries(); }
     std::string where() const override { return table_->where(); }
+    bool knownSound() const override { return table_->knownSound(); }
     int mostAtOnce() const override { return table_->mostAtOnce(); }
 
   protected:
@@ -323,6 +326,11 @@ std::uint64_t mostAtOnce(const ViewTable& table, const PeakMemory& work) {
 }
 
 }  // namespace
+
+std::uint64_t heldWhole(const Limits& limits) {
+    constexpr std::uint64_t kMost = 64u << 20, kPartOfLimit = 8;
+    return std::min(kMost, limits.maxMemoryBytes / kPartOfLimit);
+}
 
 std::uint64_t memoryOfEach(const ViewTable& table, const PeakMemory& work) {
     std::uint64_t most = 0;

@@ -154,7 +154,7 @@ def many_views(args, folder):
     for count in counts:
         must([args.stx, "convert", model, "-o", f"many{count}.exr"] + views(count), folder)
         must([args.stx, "convert", f"many{count}.exr", "-o", f"many{count}.mp4"], folder)
-        # What a set takes in memory where it is small (heldOfSets()) is more than what 36 views take one by one.
+        # What a set takes in memory where it is small (heldWhole()) is more than what 36 views take one by one.
         must([args.stx, "extract", f"many{count}.exr", "-o", f"many{count}set"], folder)
     for number, (name, line) in enumerate(of_many()):
         if args.only not in "many " + name:
@@ -350,33 +350,38 @@ def cube_of_few(args, folder):
     return wrong
 
 
-def film_of_few(args, folder):
-    """What is not the same, or takes too much, of pictures of a film whose frames do not fit memory."""
-    wrong = []
-    modes = [mode for mode in ("surface", "splat") if args.only in f"film {mode}"]
-    if not modes:
-        return wrong
-    film = os.path.join(folder, "film")
-    turned_set(film, TURNED_VIEWS, 512)
-    png(os.path.join(film, "later.png"), 512, 512, "rgb", lambda y: bytes(v for x in range(512) for v in (90, x // 2, y // 2)))
-    with open(os.path.join(film, "transforms.json"), encoding="utf-8") as file:
+def film_set(folder, count, side):
+    """Two moments of a ball from inside."""
+    turned_set(folder, count, side)
+    png(os.path.join(folder, "later.png"), side, side, "rgb", lambda y: bytes(v for x in range(side) for v in (90, x * 255 // side, y * 255 // side)))
+    with open(os.path.join(folder, "transforms.json"), encoding="utf-8") as file:
         scene = json.load(file)
     scene["frames"] = [view | {"camera": i, "time": moment, "file_path": picture}
                        for moment, picture in ((0, "c.png"), (1, "later.png")) for i, view in enumerate(scene["frames"])]
-    write(os.path.join(film, "transforms.json"), json.dumps(scene))
-    must([args.stx, "convert", "film", "-o", "film.exr"], folder)
-    for mode in modes:
-        name, pictures = f"film {mode}", []
+    write(os.path.join(folder, "transforms.json"), json.dumps(scene))
+
+
+def film_of_few(args, folder):
+    """What is not the same, or takes too much, of pictures of a film whose frames do not fit memory."""
+    wrong = []
+    films = [(mode, film) for mode in ("surface", "splat") for film in ("film_%d.exr", "film.mp4") if args.only in f"film {mode} {film}"]
+    if not films:
+        return wrong
+    film_set(os.path.join(folder, "film"), TURNED_VIEWS, 512)
+    for film in ("film_%d.exr", "film.mp4"):
+        must([args.stx, "convert", "film", "-o", film], folder)
+    for number, (mode, film) in enumerate(films):
+        name, pictures = f"film {mode} {film}", []
         for limit in (NOISY_IN_MEMORY, CUBE_LIMIT):
-            done = must([args.stx, "render", "film.exr", "-o", f"{mode}{limit}/%d.png", "--mode", mode, "--times", "all", "--orbit", "2", "--size", "256x256",
-                         "--threads", "2", "--max-memory", str(limit)], folder)
-            pictures.append(files_of(os.path.join(folder, f"{mode}{limit}")))
+            done = must([args.stx, "render", film, "-o", f"shown{number}_{limit}/%d.png", "--mode", mode, "--times", "all", "--size", "256x256",
+                         "--threads", "2", "--max-memory", str(limit)] + "--eye 0.1,0,0 --target 0,0,-3".split(), folder)
+            pictures.append(files_of(os.path.join(folder, f"shown{number}_{limit}")))
             peak = done.usage.ru_maxrss / 1024
             if args.measure:
-                print(f"{name:20} {peak:6.1f} MiB at --max-memory {limit}", flush=True)
+                print(f"{name:25} {peak:6.1f} MiB at --max-memory {limit}", flush=True)
             elif limit == CUBE_LIMIT and peak > limit + PROGRAM:
                 wrong.append(f"{name}: {peak:.1f} MiB at --max-memory {limit}")
-        if len(pictures[0]) != 2 or pictures[0] != pictures[1]:
+        if len(set(pictures[0].values())) != 2 or pictures[0] != pictures[1]:
             wrong.append(f"{name}: its pictures are not those of a larger --max-memory")
     return wrong
 
