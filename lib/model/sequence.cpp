@@ -65,6 +65,28 @@ class ChangedByView : public Sequence {
     ViewChange change_;
 };
 
+class InEnvironment : public Sequence {
+  public:
+    InEnvironment(std::unique_ptr<Sequence> frames, std::shared_ptr<const Environment> environment)
+        : frames_(std::move(frames)), environment_(std::move(environment)) {
+        timeline_ = frames_->timeline();
+    }
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        STX_TRY(auto bundle, frames_->frame(index, job));
+        bundle.environment = environment_;
+        return bundle;
+    }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        STX_TRY(auto table, frames_->views(index, job));
+        table->about().environment = environment_;
+        return table;
+    }
+
+  private:
+    std::unique_ptr<Sequence> frames_;
+    std::shared_ptr<const Environment> environment_;
+};
+
 class Watched : public Sequence {
   public:
     using Look = std::function<void(std::size_t, std::size_t, const ReferenceView&)>;
@@ -302,6 +324,11 @@ std::unique_ptr<Sequence> changed(std::unique_ptr<Sequence> frames,
 
 std::unique_ptr<Sequence> changedByView(std::unique_ptr<Sequence> frames, ViewChange change) {
     return std::make_unique<ChangedByView>(std::move(frames), std::move(change));
+}
+
+std::unique_ptr<Sequence> withEnvironment(std::unique_ptr<Sequence> frames,
+                                          std::shared_ptr<const Environment> environment) {
+    return std::make_unique<InEnvironment>(std::move(frames), std::move(environment));
 }
 
 std::unique_ptr<Sequence> watched(

@@ -138,6 +138,42 @@ class ChangedViews : public ViewTable {
     ViewChange change_;
 };
 
+class OtherHeaders : public ViewTable {
+  public:
+    OtherHeaders(std::unique_ptr<ViewTable> table, const std::vector<ViewHeader>& headers)
+        : ViewTable(headersOf(std::as_const(*table).about()), table->kinds()),
+          table_(std::move(table)) {
+        for (std::size_t i = 0; i < count(); ++i) setHeader(about().views[i], headers[i]);
+    }
+
+    std::uint64_t bytesHeld() const override { return table_->bytesHeld(); }
+    std::uint64_t bytesToMake(std::size_t index) const override {
+        return std::max(table_->bytesToMake(index), bytesOf(index));
+    }
+    std::string where() const override { return table_->where(); }
+    bool knownSound() const override { return table_->knownSound(); }
+    int mostAtOnce() const override { return table_->mostAtOnce(); }
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
+        STX_TRY(auto read, table_->view(index, job));
+        auto view = ownView(std::move(read));
+        setHeader(*view, about().views[index]);
+        return view;
+    }
+
+  private:
+    static void setHeader(ReferenceView& view, const ViewHeader& header) {
+        ViewHeader own = header;
+        own.name = std::move(view.name);
+        own.camera = view.camera;
+        own.colourFile = std::move(view.colourFile);
+        static_cast<ViewHeader&>(view) = std::move(own);
+    }
+
+    std::unique_ptr<ViewTable> table_;
+};
+
 class WatchedViews : public ViewTable {
   public:
     WatchedViews(std::unique_ptr<ViewTable> table,
@@ -300,6 +336,11 @@ std::unique_ptr<ViewTable> changedViews(std::unique_ptr<ViewTable> table, ViewCh
     if (change.kinds)
         for (ViewImageKinds& of : kinds) change.kinds(of);
     return std::make_unique<ChangedViews>(std::move(table), std::move(kinds), std::move(change));
+}
+
+std::unique_ptr<ViewTable> withHeaders(std::unique_ptr<ViewTable> table,
+                                       const std::vector<ViewHeader>& headers) {
+    return std::make_unique<OtherHeaders>(std::move(table), headers);
 }
 
 std::unique_ptr<ViewTable> watchedViews(

@@ -142,6 +142,9 @@ struct ViewChange {
 /// The same views, each changed when it is asked for.
 [[nodiscard]] std::unique_ptr<ViewTable> changedViews(std::unique_ptr<ViewTable> table,
                                                       ViewChange change);
+/// The same views with what these headers, one for each, say beside name, camera and colour file.
+[[nodiscard]] std::unique_ptr<ViewTable> withHeaders(std::unique_ptr<ViewTable> table,
+                                                     const std::vector<ViewHeader>& headers);
 /// The same views; `look` is called, from any thread, with each that is asked for, each time.
 [[nodiscard]] std::unique_ptr<ViewTable> watchedViews(
     std::unique_ptr<ViewTable> table,

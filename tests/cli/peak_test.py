@@ -7,6 +7,7 @@ do not fit memory is the same.
     tests/cli/peak_test.py build/release/bin/stx MODEL.obj SHARED_DIR --measure 1 --pixels 52
     tests/cli/peak_test.py build/release/bin/stx MODEL.obj SHARED_DIR --only many --measure 1
 """
+import hashlib
 import json
 import math
 import os
@@ -253,11 +254,14 @@ NOISY = {"refine exr": "refine {} -o OUT.exr", "refine mp4": "refine {} -o OUT.m
 
 
 def files_of(path):
-    """What is in a file, or in those of a folder."""
+    """What tells a file, or those of a folder, from others. Not their bytes: a process counts those of the one that starts it."""
+    def digest(file):
+        with open(file, "rb") as opened:
+            return hashlib.file_digest(opened, "sha256").digest()
+
     if not os.path.isdir(path):
-        return open(path, "rb").read()
-    return {name: open(os.path.join(path, name), "rb").read() for name in sorted(os.listdir(path))
-            if os.path.isfile(os.path.join(path, name))}
+        return digest(path)
+    return {name: digest(os.path.join(path, name)) for name in sorted(os.listdir(path)) if os.path.isfile(os.path.join(path, name))}
 
 
 def noisy_of_many(args, folder):
@@ -383,6 +387,50 @@ def film_of_few(args, folder):
                 wrong.append(f"{name}: {peak:.1f} MiB at --max-memory {limit}")
         if len(set(pictures[0].values())) != 2 or pictures[0] != pictures[1]:
             wrong.append(f"{name}: its pictures are not those of a larger --max-memory")
+    return wrong
+
+
+# Of films of 512²: how many views, and a limit under which no frame of them is held whole and decoded pictures of both fill
+# their part, MiB.
+FILM_VIEWS, FILM_LIMIT = (12, 36), 64
+# What converts a film. {} is its name without the ending.
+FILMS = {"exr to exr": "convert {}_%d.exr -o OUT_%d.exr", "exr to mp4": "convert {}_%d.exr -o OUT.mp4",
+         "mp4 to exr": "convert {}.mp4 -o OUT_%d.exr", "mp4 to mp4": "convert {}.mp4 -o OUT.mp4 --depth-bits 8",
+         "to jpeg": "convert {}.mp4 -o OUT.mp4 --colour jpeg"}
+
+
+def film_of_many(args, folder):
+    """What takes more for films of many views than of few, or is not the same as from memory."""
+    wrong = []
+    rows = {name: line for name, line in FILMS.items() if args.only in f"films {name}"}
+    if not rows:
+        return wrong
+    for count in FILM_VIEWS:
+        film_set(os.path.join(folder, f"film{count}"), count, 512)
+        for film in (f"film{count}_%d.exr", f"film{count}.mp4"):
+            must([args.stx, "convert", f"film{count}", "-o", film], folder)
+    for number, (name, line) in enumerate(rows.items()):
+        def converted(count, limit=FILM_LIMIT):
+            words = line.replace("OUT", f"films/{number}").replace("{}", f"film{count}").split()
+            os.makedirs(os.path.join(folder, "films"), exist_ok=True)
+            done = must([args.stx] + words + ["--threads", "2", "--max-memory", str(limit)], folder)
+            made = files_of(os.path.join(folder, "films"))
+            for file in made:
+                os.remove(os.path.join(folder, "films", file))
+            return done.usage.ru_maxrss / 1024, made
+
+        few = converted(FILM_VIEWS[0])[0]
+        many, made = converted(FILM_VIEWS[1])
+        in_memory, expected = converted(FILM_VIEWS[1], NOISY_IN_MEMORY)
+        for _ in range(0 if args.measure else TRIES):
+            if many > MOST * few:
+                few, many = max(few, converted(FILM_VIEWS[0])[0]), min(many, converted(FILM_VIEWS[1])[0])
+        if args.measure:
+            print(f"films {name:21} {few:6.1f} MiB of {FILM_VIEWS[0]} views, {many:6.1f} of {FILM_VIEWS[1]}: {many / few:.2f}; in memory {in_memory:.1f}", flush=True)
+        elif many > MOST * few:
+            wrong.append(f"films {name}: {many:.1f} MiB of {FILM_VIEWS[1]} views, {few:.1f} of {FILM_VIEWS[0]}")
+        if made != expected:
+            wrong.append(f"films {name}: it is not that of a larger --max-memory")
     return wrong
 
 
@@ -513,6 +561,7 @@ def main():
         wrong += noisy_of_many(args, folder)
         wrong += cube_of_few(args, folder)
         wrong += film_of_few(args, folder)
+        wrong += film_of_many(args, folder)
     print("\n".join(wrong))
     sys.exit(1 if wrong else 0)
 
