@@ -13,6 +13,7 @@ import math
 import os
 import random
 import re
+import shutil
 import struct
 import sys
 import tempfile
@@ -261,7 +262,8 @@ def files_of(path):
 
     if not os.path.isdir(path):
         return digest(path)
-    return {name: digest(os.path.join(path, name)) for name in sorted(os.listdir(path)) if os.path.isfile(os.path.join(path, name))}
+    return {os.path.relpath(os.path.join(folder, name), path): digest(os.path.join(folder, name))
+            for folder, _, names in os.walk(path) for name in names}
 
 
 def noisy_of_many(args, folder):
@@ -397,7 +399,8 @@ FILM_VIEWS, FILM_LIMIT = (12, 36), 64
 FILMS = {"exr to exr": "convert {}_%d.exr -o OUT_%d.exr", "exr to mp4": "convert {}_%d.exr -o OUT.mp4",
          "mp4 to exr": "convert {}.mp4 -o OUT_%d.exr", "mp4 to mp4": "convert {}.mp4 -o OUT.mp4 --depth-bits 8",
          "to jpeg": "convert {}.mp4 -o OUT.mp4 --colour jpeg",
-         "set to exr": "convert {} -o OUT_%d.exr", "set to mp4": "convert {} -o OUT.mp4"}
+         "set to exr": "convert {} -o OUT_%d.exr", "set to mp4": "convert {} -o OUT.mp4",
+         "folder of exr": "extract {}_%d.exr -o OUT --refine off", "folder of mp4": "extract {}.mp4 -o OUT --refine off"}
 
 
 def film_of_many(args, folder):
@@ -413,11 +416,10 @@ def film_of_many(args, folder):
     for number, (name, line) in enumerate(rows.items()):
         def converted(count, limit=FILM_LIMIT):
             words = line.replace("OUT", f"films/{number}").replace("{}", f"film{count}").split()
-            os.makedirs(os.path.join(folder, "films"), exist_ok=True)
+            os.makedirs(os.path.join(folder, "films"))
             done = must([args.stx] + words + ["--threads", "2", "--max-memory", str(limit)], folder)
             made = files_of(os.path.join(folder, "films"))
-            for file in made:
-                os.remove(os.path.join(folder, "films", file))
+            shutil.rmtree(os.path.join(folder, "films"))
             return done.usage.ru_maxrss / 1024, made
 
         few = converted(FILM_VIEWS[0])[0]
