@@ -400,7 +400,8 @@ FILMS = {"exr to exr": "convert {}_%d.exr -o OUT_%d.exr", "exr to mp4": "convert
          "mp4 to exr": "convert {}.mp4 -o OUT_%d.exr", "mp4 to mp4": "convert {}.mp4 -o OUT.mp4 --depth-bits 8",
          "to jpeg": "convert {}.mp4 -o OUT.mp4 --colour jpeg",
          "set to exr": "convert {} -o OUT_%d.exr", "set to mp4": "convert {} -o OUT.mp4",
-         "folder of exr": "extract {}_%d.exr -o OUT --refine off", "folder of mp4": "extract {}.mp4 -o OUT --refine off"}
+         "folder of exr": "extract {}_%d.exr -o OUT --refine off", "folder of mp4": "extract {}.mp4 -o OUT --refine off",
+         "sheet of exr": "sheet {}_%d.exr -o OUT.png --refine off", "sheet of mp4": "sheet {}.mp4 -o OUT.png --refine off"}
 
 
 def film_of_many(args, folder):
