@@ -215,27 +215,32 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
             changedOnTheWay(std::move(frames), target, [imported, &o](Bundle& bundle, Job& job) {
                 return o.refining.refine(bundle, *imported, job);
             });
-    if (const auto bits = o.mesh->depthBits)
-        frames = changed(std::move(frames), [bits = *bits](Bundle& bundle, Job&) -> Result<void> {
-            for (ReferenceView& view : bundle.views) view.depthBits = bits;
+    if (const auto bits = o.mesh->depthBits) {
+        ViewChange change;
+        change.header = [bits = *bits](ViewHeader& header) { header.depthBits = bits; };
+        change.change = [set = change.header](ReferenceView& view, Job&) -> Result<void> {
+            set(view);
             return {};
-        });
+        };
+        frames = changedByView(std::move(frames), std::move(change));
+    }
     if (o.environment.given()) {
         STX_TRY(auto environment, environmentOf(o.environment, program.job));
-        frames = changed(std::move(frames), [environment](Bundle& bundle, Job&) -> Result<void> {
-            bundle.environment = environment;
-            return {};
-        });
+        frames = withEnvironment(std::move(frames), std::move(environment));
     }
     noteUnused(input, Reads::film, o, program);
     Converted done;
     const Timeline timeline = frames->timeline();
-    // The first frame is looked at when it passes.
-    frames = changed(std::move(frames), [&done, countPoints](Bundle& bundle, Job&) -> Result<void> {
-        if (done.views == 0) done = summaryOf(bundle, countPoints);
-        return {};
-    });
+    ViewTally tally;
+    frames = watched(tallied(std::move(frames), tally),
+                     [&done](std::size_t frame, std::size_t index, const ReferenceView& view) {
+                         if (frame == 0 && index == 0)
+                             done.size = {view.camera.width, view.camera.height};
+                     });
+    keepFreedMemory();  // of a view, for the next one
     STX_CHECK(saveSequence(*frames, target, saveOptions(o, program), program.job));
+    done.views = tally.views();
+    if (countPoints) done.points = tally.points();
     done.timeline = timeline;
     return done;
 }

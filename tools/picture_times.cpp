@@ -151,10 +151,8 @@ Result<MovingPictures::FrameViews> MovingPictures::read(std::size_t frame, Job& 
             return out;
         }
         fits_ = true;
-        if (table->whole()) {
-            STX_TRY(out.bundle, wholeBundle(std::move(table), job));
-            return out;
-        }
+        STX_TRY(out.bundle, wholeBundle(std::move(table), job));
+        return out;
     }
     STX_TRY(out.bundle, frames_->frame(frame, job));
     return out;
@@ -174,7 +172,7 @@ Result<Renderer*> MovingPictures::at(double time, std::optional<double> next) {
     if (frame_ != frame) {
         if (!fits_) {  // there is room for one
             renderer_.reset();
-            spooled_ = {};
+            spooled_.reset();
         }
         STX_TRY(auto shown, viewsOf(frame));
         Bundle& bundle = shown.bundle;
@@ -202,8 +200,8 @@ Result<Renderer*> MovingPictures::at(double time, std::optional<double> next) {
         if (light_) settings.lighting.environment = ownLight_;
         environment_ = settings.environment != nullptr;
         if (shown.spool) {
-            spooled_ = std::move(shown);
-            STX_TRY(renderer_, makeRenderer(backend_, spooled_.bundle, *spooled_.spool, settings,
+            spooled_.emplace(std::move(shown));
+            STX_TRY(renderer_, makeRenderer(backend_, spooled_->bundle, *spooled_->spool, settings,
                                             device_, job_));
         } else {
             STX_TRY(renderer_, rendererOf(std::move(bundle), settings, job_, backend_, device_));

@@ -88,7 +88,9 @@ class MovingPictures {
     bool fits_ = false;  ///< a frame has been in memory: all have views of the same sizes
     std::future<Result<FrameViews>> coming_;
     std::optional<std::size_t> comingFrame_, frame_;
-    FrameViews spooled_;  ///< the frame that is drawn, where it is in a spool
+    /// The frame that is drawn, where it is in a spool. Not assigned to: the old bundle would
+    /// outlive its spool.
+    std::optional<FrameViews> spooled_;
     std::unique_ptr<Renderer> renderer_;
     std::vector<Camera> views_;
     std::shared_ptr<const Environment> own_;  ///< of the frames

@@ -8,11 +8,11 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <system_error>
 #include <vector>
 
 #include "formats/files/temporaries.hpp"
+#include "lib/model/same_pictures.hpp"
 
 namespace stx {
 namespace {
@@ -26,11 +26,6 @@ Pixels pixelsOf(Image<float>& depth) {
 Pixels pixelsOf(Texture& texture) {
     if (Rgba8Image* bytes = texture.rgba8()) return std::as_writable_bytes(bytes->pixels());
     return std::as_writable_bytes(texture.rgbaFloat()->pixels());
-}
-
-std::size_t hashOf(Pixels pixels) {
-    return std::hash<std::string_view>()(
-        {reinterpret_cast<const char*>(pixels.data()), pixels.size()});
 }
 
 /// Pixels one after another in a file without readers but this process.

@@ -431,18 +431,24 @@ Result<void> describeMesh(const fs::path& path, const InfoOptions& options, Json
     return {};
 }
 
-/// Whether what was described is an image set whose views are read when they are asked for, as far
-/// as that shows before it is read.
-bool setOnDemand(FileKind kind, const Json& out, const Limits& limits) {
-    if (kind != FileKind::imageSet || out.value("frames", 1) > 1) return false;
+/// What commands take of an image set at a moment, as far as that shows before it is read.
+Result<Json> memoryOfSet(const fs::path& path, Job& job) {
+    Job quiet;  // it has been described
+    quiet.workFor(job);
+    STX_TRY(const auto set, summariseImageSet(path, quiet));
     std::uint64_t bytes = 0;
-    const std::uint64_t each = ViewImageKinds().bytesPerPixel();
-    for (const auto& view : out["views"]) {
-        if (view.value("panorama", false)) return false;
-        bytes += each * static_cast<std::uint64_t>(std::max(view.value("width", 0), 0)) *
-                 static_cast<std::uint64_t>(std::max(view.value("height", 0), 0));
+    bool alone = true;
+    auto views = Json::array();
+    for (const auto& view : set.views) {
+        if (view.later) continue;
+        const Camera& c = view.camera;
+        views.push_back({{"name", view.name}, {"width", c.width}, {"height", c.height}});
+        bytes += ViewImageKinds().bytesPerPixel() * static_cast<std::uint64_t>(c.width) *
+                 static_cast<std::uint64_t>(c.height);
+        alone = alone && !view.panorama && !view.video;
     }
-    return out["views"].size() > 1 && bytes > heldOfSets(limits);
+    const bool onDemand = alone && views.size() > 1 && bytes > heldWhole(job.limits);
+    return memoryOfSizes(views, onDemand, job.limits);
 }
 
 /// What takes more than headers: what of the pixels was asked for.
@@ -460,8 +466,8 @@ Result<void> addMeasured(const fs::path& path, FileKind kind, const InfoOptions&
     if (options.memory) {
         auto memory = [&]() -> Result<Json> {
             const bool onDemand = kind == FileKind::mpeg4 || out["container"] == "exr";
-            if (!onDemand)
-                return memoryOfSizes(out["views"], setOnDemand(kind, out, job.limits), job.limits);
+            if (kind == FileKind::imageSet) return memoryOfSet(path, job);
+            if (!onDemand) return memoryOfSizes(out["views"], false, job.limits);
             STX_TRY(const auto table, openViews(path, open, job));
             return memoryJson(*table, job);
         }();

@@ -159,7 +159,7 @@ Result<std::variant<Mesh, std::unique_ptr<ViewTable>>> openMeshOrViews(const fs:
     }
     if (kind == FileKind::imageSet || !options.set.from.empty()) {
         STX_CHECK(checkObject(path, FileKind::imageSet, options));
-        STX_TRY(auto table, openSetViews(path, options.set, job, heldOfSets(job.limits)));
+        STX_TRY(auto table, openSetViews(path, options.set, job, heldWhole(job.limits)));
         return Opened(std::move(table));
     }
     STX_TRY(auto opened, openRenderable(path, options, job));

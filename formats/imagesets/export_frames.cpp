@@ -1,11 +1,11 @@
 #include <algorithm>
+#include <utility>
 
 #include "formats/exr/environment_exr.hpp"
 #include "formats/files/files.hpp"
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/imagesets/export_files.hpp"
-#include "lib/base/parallel.hpp"
 #include "lib/model/same_pictures.hpp"
 
 namespace stx {
@@ -48,54 +48,56 @@ class FrameExporter {
     /// What the files of a view were last.
     struct WrittenView {
         std::string name;  ///< of its newest files
-        ReferenceView before;
+        PicturesKey pictures;
     };
 
     Result<void> add(std::size_t index) {
         // Notes are those of the first frame.
         Job quiet;
         quiet.workFor(job_);
-        STX_TRY(auto bundle, frames_.frame(index, index == 0 ? job_ : quiet));
-        STX_CHECK(bundle.check());
-        STX_CHECK(checkPeak(peak::kExport, bundle.views, job_.limits));
-        if (index == 0)
-            STX_CHECK(begin(bundle));
-        else
-            STX_CHECK(checkSameViews(first_, bundle));
-        std::vector<Result<void>> written(bundle.views.size());
-        parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
-            const auto k = static_cast<std::size_t>(i);
-            written[k] = writeView(bundle.views[k], k, index);
-        });
-        for (std::size_t k = 0; k < bundle.views.size(); ++k) {
-            if (!written[k]) return propagate(written[k]);
-            if (tracks_[k].name.empty()) continue;
-            const ReferenceView& view = bundle.views[k];
-            auto frame = transformsFrame(view, view.texture.isLinear(), tracks_[k].name, options_,
-                                         bundle.origin);
-            frame["time"] = frames_.timeline().times[index];
-            frame["camera"] = bundle.views[k].name;
-            json_["frames"].push_back(std::move(frame));
-            tracks_[k].before = std::move(bundle.views[k]);
+        Job& job = index == 0 ? job_ : quiet;
+        STX_TRY(auto table, frames_.views(index, job));
+        // The unit follows from the first frame's planes.
+        if (index == 0 && !table->planesKnown()) {
+            STX_TRY(auto whole, wholeBundle(std::move(table), job));
+            table = tableOf(std::move(whole));
         }
+        const Bundle& about = std::as_const(*table).about();
+        if (index == 0)
+            STX_CHECK(begin(*table));
+        else
+            STX_CHECK(checkSameViews(first_, about));
+        std::vector<OutputJson> shown(table->count());
+        const auto write = [&](std::size_t k,
+                               const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
+            if (auto sound = view->check(); !sound)
+                return tl::unexpected(sound.error().at(fmt::format("view {}", k)));
+            STX_CHECK(writeView(*view, k, index));
+            if (tracks_[k].name.empty()) return {};
+            shown[k] = transformsFrame(*view, view->texture.isLinear(), tracks_[k].name, options_,
+                                       about.origin);
+            shown[k]["time"] = frames_.timeline().times[index];
+            shown[k]["camera"] = view->name;
+            return {};
+        };
+        STX_CHECK(forEachView(*table, peak::kExport, job, write));
+        for (OutputJson& frame : shown)
+            if (!frame.empty()) json_["frames"].push_back(std::move(frame));
         return {};
     }
 
-    Result<void> begin(const Bundle& bundle) {
+    Result<void> begin(const ViewTable& table) {
+        const Bundle& bundle = table.about();
         json_["stx:title"] = bundle.title;
         const glm::dvec3& o = bundle.origin;
         if (o != glm::dvec3(0.0)) json_["stx:origin"] = {o.x, o.y, o.z};
-        bundle.noteMaterialLeftOut(job_);
+        noteMaterialLeftOut(table, job_);
         double farthest = 0;
-        for (const ReferenceView& view : bundle.views) {
-            farthest = std::max(farthest, view.farPlane);
-            if (view.hasNormals() || view.hasSplats())
+        for (const ViewImageKinds& kinds : table.kinds())
+            if (kinds.normal || kinds.hasSplats())
                 job_.note("normals and splats have no place in an image set and are left out");
-            ReferenceView header;
-            header.name = view.name;
-            header.camera = view.camera;
-            first_.views.push_back(std::move(header));
-        }
+        for (const ReferenceView& view : bundle.views) farthest = std::max(farthest, view.farPlane);
+        first_ = headersOf(bundle);
         if (options_.depth == ExportOptions::Depth::png) {
             // One unit for all frames, with room for things that go away from the camera.
             if (2 * farthest > unit_ * 65535) unit_ = 2 * farthest / 65535;
@@ -114,7 +116,9 @@ class FrameExporter {
         WrittenView& track = tracks_[k];
         // A camera of which nothing is known yet has no picture.
         if (track.name.empty() && view.depthMayBeUnknown() && view.pointCount() == 0) return {};
-        if (index > 0 && samePictures(view, track.before)) return {};
+        PicturesKey pictures = PicturesKey::of(view);
+        if (index > 0 && pictures == track.pictures) return {};
+        track.pictures = std::move(pictures);
         track.name = fmt::format("{}_{:04}", names_[k], index);
         loss_.look(view, options_);
         STX_CHECK(writeColour(view, root_ / "images" / track.name, options_));

@@ -1,7 +1,10 @@
 #include "formats/imagesets/image_sets.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <functional>
+#include <memory>
 
 #include "formats/files/messages.hpp"
 #include "formats/files/not_there.hpp"
@@ -153,22 +156,43 @@ Result<void> passOver(const SetDescription& set, Motion& motion, const Motion::T
     return {};
 }
 
+/// Reads a set of one moment as a Bundle or a table: readViews(), or tableOfViews().
+template <class T>
+using ReadSet = std::function<Result<T>(SetDescription set, const ImageSetOptions& options,
+                                        Job& job, std::optional<std::size_t>* failing)>;
+
+ReadSet<Bundle> whole(const std::string& where) {
+    return [where](SetDescription set, const ImageSetOptions& options, Job& job,
+                   std::optional<std::size_t>* failing) {
+        return readViews(std::move(set), where, options, job, failing);
+    };
+}
+ReadSet<std::unique_ptr<ViewTable>> asTable(const std::string& where, std::uint64_t held,
+                                            std::shared_ptr<std::atomic<bool>> said) {
+    return [where, held, said = std::move(said)](SetDescription set, const ImageSetOptions& options,
+                                                 Job& job, std::optional<std::size_t>* failing) {
+        return tableOfViews(std::move(set), where, options, held, job, failing, said);
+    };
+}
+
 /// A moment of a film. Pictures that are damaged join those that are gone, with a note of the
 /// first. Errors where it has none at all, or `strict`.
-Result<Bundle> momentOf(const SetDescription& set, Motion& motion, std::size_t frame,
-                        const std::string& where, const ImageSetOptions& options, Job& job) {
+template <class T>
+Result<T> momentOf(const SetDescription& set, Motion& motion, std::size_t frame,
+                   const std::string& where, const ImageSetOptions& options, Job& job,
+                   const ReadSet<T>& read) {
     for (;;) {
         if (motion.nothingBegan(set, frame))
             return tl::unexpected(motion.gone.at(motion.tracks.front().views.front()));
         std::optional<std::size_t> failing;
         Job attempt;
         attempt.workFor(job);
-        auto bundle = readViews(motion.moment(set, frame), where, options, attempt, &failing);
-        if (bundle || !failing || options.strict || !isDamage(bundle.error())) {
+        auto views = read(motion.moment(set, frame), options, attempt, &failing);
+        if (views || !failing || options.strict || !isDamage(views.error())) {
             attempt.passNotesOn();
-            return bundle;
+            return views;
         }
-        STX_CHECK(passOver(set, motion, motion.tracks[*failing], frame, bundle.error(), where,
+        STX_CHECK(passOver(set, motion, motion.tracks[*failing], frame, views.error(), where,
                            options, job));
     }
 }
@@ -226,19 +250,36 @@ class SetSequence : public Sequence {
     }
 
     Result<Bundle> frame(std::size_t index, Job& job) override {
+        STX_TRY(auto bundle, read(index, job, whole(inQuotes(path_.string()))));
+        finish(bundle, index);
+        return bundle;
+    }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        STX_TRY(auto table,
+                read(index, job, asTable(inQuotes(path_.string()), heldWhole(job.limits), said_)));
+        finish(table->about(), index);
+        return table;
+    }
+
+  private:
+    template <class T>
+    Result<T> read(std::size_t index, Job& job, const ReadSet<T>& of) {
         const std::string where = inQuotes(path_.string());
-        STX_TRY(auto bundle, motion_.moves() ? momentOf(set_, motion_, index, where, options_, job)
-                                             : described(index, where, job));
+        return motion_.moves() ? momentOf(set_, motion_, index, where, options_, job, of)
+                               : described(index, where, job, of);
+    }
+    /// What all frames share, and the time.
+    void finish(Bundle& bundle, std::size_t index) {
         if (!environment_) environment_ = bundle.environment;
         set_.environment.clear();
         bundle.environment = environment_;
         setTime(bundle, index);
-        return bundle;
     }
 
-  private:
     /// A frame of a set that is described again for each, with all its cameras.
-    Result<Bundle> described(std::size_t index, const std::string& where, Job& job) {
+    template <class T>
+    Result<T> described(std::size_t index, const std::string& where, Job& job,
+                        const ReadSet<T>& of) {
         ImageSetOptions options = options_;
         options.frame = static_cast<int>(index) * options_.every;
         STX_TRY(auto now, describeSet(path_, options, job));
@@ -248,10 +289,11 @@ class SetSequence : public Sequence {
                               camera.name, options.frame);
         if (set_.origin) now.origin = set_.origin;
         if (environment_) now.environment.clear();
-        return readViews(std::move(now), where, options_, job);
+        return of(std::move(now), options_, job, nullptr);
     }
 
     std::shared_ptr<const Environment> environment_;
+    std::shared_ptr<std::atomic<bool>> said_ = std::make_shared<std::atomic<bool>>(false);
     std::filesystem::path path_;
     ImageSetOptions options_;
     SetDescription set_;
@@ -272,7 +314,7 @@ class StillSet : public Sequence {
     }
     Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
         if (index > 0) return Sequence::views(index, job);
-        return tableOfViews(set_, where_, options_, heldOfSets(job.limits), job);
+        return tableOfViews(set_, where_, options_, heldWhole(job.limits), job);
     }
 
   private:
@@ -282,11 +324,6 @@ class StillSet : public Sequence {
 };
 
 }  // namespace
-
-std::uint64_t heldOfSets(const Limits& limits) {
-    constexpr std::uint64_t kMost = 64u << 20, kPartOfLimit = 8;
-    return std::min(kMost, limits.maxMemoryBytes / kPartOfLimit);
-}
 
 Result<SetDescription> imagesets::describeSet(const path& path, const ImageSetOptions& options,
                                               Job& job) {
@@ -325,16 +362,15 @@ Result<Described> describeToRead(const std::filesystem::path& path, const ImageS
 }
 
 /// The moment of a set that moves that the options name.
-Result<Bundle> momentAsked(Described& described, const std::string& where,
-                           const ImageSetOptions& options, Job& job) {
+template <class T>
+Result<T> momentAsked(Described& described, const std::string& where,
+                      const ImageSetOptions& options, Job& job, const ReadSet<T>& read) {
     Motion& motion = described.motion;
     if (options.frame == 0)
         job.note(fmt::format("the set moves: {} frames over {:.4g} s; this is the first",
                              motion.times.size(), motion.timeline().duration()));
     const auto frame = static_cast<std::size_t>(options.frame);
-    STX_TRY(auto bundle, momentOf(described.set, motion, frame, where, ofMoment(options), job));
-    bundle.time = motion.times[frame];
-    return bundle;
+    return momentOf(described.set, motion, frame, where, ofMoment(options), job, read);
 }
 
 }  // namespace
@@ -343,7 +379,11 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
                             Job& job) {
     const std::string where = inQuotes(path.string());
     STX_TRY(auto described, describeToRead(path, options, job));
-    if (described.motion.moves()) return momentAsked(described, where, options, job);
+    if (described.motion.moves()) {
+        STX_TRY(auto bundle, momentAsked(described, where, options, job, whole(where)));
+        bundle.time = described.motion.times[static_cast<std::size_t>(options.frame)];
+        return bundle;
+    }
     return readViews(std::move(described.set), where, options, job);
 }
 
@@ -354,8 +394,9 @@ Result<std::unique_ptr<ViewTable>> openSetViews(const std::filesystem::path& pat
     STX_TRY(auto described, describeToRead(path, options, job));
     if (!described.motion.moves())
         return tableOfViews(std::move(described.set), where, options, held, job);
-    STX_TRY(auto bundle, momentAsked(described, where, options, job));
-    return tableOf(std::move(bundle));
+    STX_TRY(auto table, momentAsked(described, where, options, job, asTable(where, held, nullptr)));
+    table->about().time = described.motion.times[static_cast<std::size_t>(options.frame)];
+    return table;
 }
 
 Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path,

@@ -102,7 +102,9 @@ Result<void> prepareToRead(SetDescription& set, const std::string& where,
 Result<std::vector<ReferenceView>> loadOne(const SetView& view, const ImageSetOptions& options,
                                            RefineReport& report, Job& job) {
     try {
-        return loadSetView(view, options, report, job);
+        STX_TRY(auto views, loadSetView(view, options, report, job));
+        if (view.absent) std::ranges::for_each(views, makeUnknown);
+        return views;
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::failed, "view '{}': there is not enough memory", view.name);
     }
@@ -239,12 +241,8 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
                      }));
     Bundle bundle;
     bundle.title = std::move(set.title);
-    for (std::size_t i = 0; i < loaded.size(); ++i) {
-        for (ReferenceView& view : loaded[i]) {
-            if (set.views[i].absent) makeUnknown(view);
-            bundle.views.push_back(std::move(view));
-        }
-    }
+    for (std::vector<ReferenceView>& views : loaded)
+        for (ReferenceView& view : views) bundle.views.push_back(std::move(view));
     makeNamesUnique(bundle.views);
     makeAllLinear(bundle.views);
     if (!set.environment.empty()) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -30,11 +31,12 @@ namespace stx::imagesets {
 
 /// The same views as a table. Where nothing looks at all of them at once, and they would take more
 /// than `held` bytes, each is read once here, for what is known of them before pixels are asked
-/// for, and again when it is asked for; else they are in memory.
-[[nodiscard]] Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set,
-                                                              const std::string& where,
-                                                              const ImageSetOptions& options,
-                                                              std::uint64_t held, Job& job);
+/// for, and again when it is asked for; else they are in memory. `failing` as above. `said`, if
+/// any, is shared by the moments of a film, of which one says that views disagree.
+[[nodiscard]] Result<std::unique_ptr<ViewTable>> tableOfViews(
+    SetDescription set, const std::string& where, const ImageSetOptions& options,
+    std::uint64_t held, Job& job, std::optional<std::size_t>* failing = nullptr,
+    std::shared_ptr<std::atomic<bool>> said = nullptr);
 
 // What both ways have in common.
 
@@ -42,7 +44,8 @@ namespace stx::imagesets {
 /// the rest can be read.
 [[nodiscard]] Result<void> prepareToRead(SetDescription& set, const std::string& where,
                                          const ImageSetOptions& options, Job& job);
-/// loadSetView(), with an error where the memory does not do.
+/// loadSetView(), of which nothing is known where the view is absent, with an error where the
+/// memory does not do.
 [[nodiscard]] Result<std::vector<ReferenceView>> loadOne(const SetView& view,
                                                          const ImageSetOptions& options,
                                                          RefineReport& report, Job& job);

@@ -1,6 +1,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <atomic>
 #include <optional>
 #include <utility>
 
@@ -51,6 +52,7 @@ struct Looked {
     bool linear = false;      ///< some picture holds linear light: all are to
     bool posesAsked = false;  ///< poses were to be aligned, or left
     std::unique_ptr<DisagreementByView> disagreement;
+    std::shared_ptr<std::atomic<bool>> said;  ///< that they disagree
     ColourPoints points;  ///< of what is given; empty where that is not what was looked at
 };
 
@@ -68,6 +70,7 @@ class SetViews : public ViewTable, public ViewsLookedAt {
     std::uint64_t bytesToMake(std::size_t index) const override {
         return 2 * bytesOf(index) + kReadingTakes * pixelsOf(index);
     }
+    bool knownSound() const override { return true; }
     std::string where() const override { return where_; }
     const ColourPoints* colourPoints() const override {
         return looked_.points.empty() ? nullptr : &looked_.points;
@@ -92,7 +95,8 @@ class SetViews : public ViewTable, public ViewsLookedAt {
         if (looked_.linear) makeLinear(*view);
         if (looked_.disagreement->compare(index, view->depth, about()))
             if (const auto note = disagreementNote(about(), looked_.disagreement->result(),
-                                                   looked_.posesAsked || posesWereAligned(about())))
+                                                   looked_.posesAsked || posesWereAligned(about()));
+                note && !looked_.said->exchange(true))
                 job.noteAbove(*note);
         return view;
     }
@@ -104,12 +108,12 @@ class SetViews : public ViewTable, public ViewsLookedAt {
     Looked looked_;
 };
 
-/// Whether each view of a set can be made from its own files alone. One that repeats its camera's
-/// last picture, and the faces of panoramas, come from films and sets of few pictures.
+/// Whether each view of a set can be made from its own files alone, at any time: the faces of
+/// panoramas come together, and frames of video one after another.
 bool standAlone(const SetDescription& set, const ImageSetOptions& options) {
     return !(set.photo && options.photo.behindPercent > 0) &&
            std::ranges::none_of(set.views, [](const SetView& view) {
-               return view.panorama || view.absent || view.texture.film || view.depth.film;
+               return view.panorama || view.texture.film || view.depth.film;
            });
 }
 
@@ -145,10 +149,11 @@ Result<std::size_t> viewsAtOnce(const SetDescription& set, const Limits& limits)
 
 Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::string& where,
                                                 const ImageSetOptions& options, std::uint64_t held,
-                                                Job& job) {
+                                                Job& job, std::optional<std::size_t>* failing,
+                                                std::shared_ptr<std::atomic<bool>> said) {
     const auto memory = memoryOfImages(set);
     if (set.views.size() < 2 || (memory && *memory <= held) || !standAlone(set, options)) {
-        STX_TRY(auto bundle, readViews(std::move(set), where, options, job));
+        STX_TRY(auto bundle, readViews(std::move(set), where, options, job, failing));
         return tableOf(std::move(bundle));
     }
     STX_CHECK(prepareToRead(set, where, options, job));
@@ -160,6 +165,7 @@ Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::s
     looked.kinds.resize(count);
     looked.points.resize(count);
     looked.disagreement = std::make_unique<DisagreementByView>(count);
+    looked.said = said ? std::move(said) : std::make_shared<std::atomic<bool>>(false);
     for (const SetView& view : set.views) looked.files.emplace_back(view);
     std::vector<Bounds> bounds(count);
     std::vector<PoseSample> samples(count);
@@ -178,7 +184,7 @@ Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::s
         return {};
     };
     STX_TRY(const std::size_t atOnce, within(where, viewsAtOnce(set, job.limits)));
-    STX_TRY(RefineReport report, loadEach(set, where, options, atOnce, job, nullptr, look));
+    STX_TRY(RefineReport report, loadEach(set, where, options, atOnce, job, failing, look));
     makeNamesUnique(headers.views);
     looked.linear = std::ranges::any_of(looked.kinds, &ViewImageKinds::linear);
     for (ViewImageKinds& kinds : looked.kinds) kinds.linear = looked.linear;

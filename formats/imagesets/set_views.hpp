@@ -9,14 +9,11 @@
 
 namespace stx {
 
-/// Images of a set that take no more than so many bytes are all in memory when it is opened as a
-/// table: that is faster than to read each picture twice, and hardly shows beside the program.
-[[nodiscard]] std::uint64_t heldOfSets(const Limits& limits);
-/// The views of readImageSet() as a table. Of a set of one moment whose images take more than
-/// `held` bytes, each view is read once here, for its planes and marks, and again when it is asked
-/// for; a file that changes meanwhile is an error (invalidInput). Views that are taken together are
-/// in memory all the same: panoramas, and frames of films. That views
-/// disagree is noted when the last of them has been asked for.
+/// The views of readImageSet() as a table. Where their images take more than `held` bytes, each
+/// view is read once here, for its planes and marks, and again when it is asked for; a file that
+/// changes meanwhile is an error (invalidInput). Views that are taken together are in memory all
+/// the same: panoramas, and frames of video. That views disagree is noted when the last of them has
+/// been asked for.
 [[nodiscard]] Result<std::unique_ptr<ViewTable>> openSetViews(const std::filesystem::path& path,
                                                               const ImageSetOptions& options,
                                                               Job& job, std::uint64_t held);

@@ -39,12 +39,17 @@ Result<ImageSetSummary> summariseImageSet(const std::filesystem::path& path, Job
         summary.timeline = motion.timeline();
     else if (described->frames > 1)
         summary.timeline = steadyTimeline(described->frames, described->rate);
+    std::unordered_set<std::size_t> first;
+    for (const Motion::Track& track : motion.tracks)
+        if (const auto picture = motion.pictureAt(*described, track, 0)) first.insert(*picture);
     std::unordered_set<std::string> counted;
     for (const SetView& view : described->views) {
         ImageSetSummary::View out;
         out.name = view.name;
         out.camera = view.camera;
         out.panorama = view.panorama.has_value();
+        out.video = view.texture.film || view.depth.film;
+        out.later = motion.moves() && !first.contains(summary.views.size());
         out.colour = view.texture.name;
         out.depth = view.depth.name;
         for (const PictureSource* source : {&view.texture, &view.depth}) {

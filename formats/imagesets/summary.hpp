@@ -22,6 +22,8 @@ struct ImageSetSummary {
         Camera camera;          ///< in our axes; width and height are 0 when only its missing
                                 ///< picture would tell them
         bool panorama = false;  ///< equirectangular: the camera has position and orientation only
+        bool video = false;     ///< a frame of video files
+        bool later = false;     ///< of a set that moves: another is shown at its first moment
         std::string colour;     ///< names as the set has them; empty where one file holds all
         std::string depth;
         std::vector<std::string> missing;  ///< those of the two that are not there

@@ -24,7 +24,7 @@ Result<std::vector<Finding>> validateImageSet(const std::filesystem::path& path,
     auto views = [&]() -> Result<std::vector<Finding>> {
         ImageSetOptions asGiven;
         asGiven.refine.set(RefineStep::poses, false);
-        STX_TRY(const auto table, openSetViews(path, asGiven, job, heldOfSets(job.limits)));
+        STX_TRY(const auto table, openSetViews(path, asGiven, job, heldWhole(job.limits)));
         return validateViews(*table, job);
     }();
     if (views) return views;

@@ -39,9 +39,13 @@ void checkLaterMoments(Document document, const std::filesystem::path& folder, F
     std::size_t found = 0;
     for (std::size_t i = 1; i < times.size() && found < kMostFindings; ++i) {
         if (!job.checkCancelled()) return;
-        const auto frame = (*frames)->frame(i, quiet);
-        if (frame) continue;
-        findings.add(2032, fmt::format("{:g} s", times[i]), frame.error().text(),
+        const auto sound = [&]() -> Result<void> {
+            STX_TRY(const auto table, (*frames)->views(i, quiet));
+            return forEachView(*table, {"reading", 0}, quiet,
+                               [](std::size_t, const auto&) { return Result<void>(); });
+        }();
+        if (sound) continue;
+        findings.add(2032, fmt::format("{:g} s", times[i]), sound.error().text(),
                      "a moment that can be read");
         ++found;
     }

@@ -1,6 +1,11 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstring>
+#include <functional>
+#include <span>
+#include <string_view>
 
 #include "lib/model/reference_view.hpp"
 
@@ -22,5 +27,35 @@ namespace stx {
            same(a.splatU, b.splatU) && same(a.splatV, b.splatV) &&
            same(a.metallicRoughness, b.metallicRoughness) && same(a.emissive, b.emissive);
 }
+
+/// A hash of bytes, which differs but once in 2^64 where they do.
+[[nodiscard]] inline std::size_t hashOf(std::span<const std::byte> bytes) {
+    return std::hash<std::string_view>()(
+        {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+/// What is kept of a view to know its images again when they are not in memory any more: equal
+/// where samePictures() says so of views of one size; hashes (hashOf()) stand for the pixels.
+struct PicturesKey {
+    bool pruned = false, linear = false;
+    NoDepth noDepth = NoDepth::empty;
+    Refined refined;
+    /// Texture, depth, normal, splatU, splatV, metallicRoughness, emissive.
+    std::array<std::size_t, 7> hashes{};
+    bool operator==(const PicturesKey&) const = default;
+
+    [[nodiscard]] static PicturesKey of(const ReferenceView& view) {
+        const auto hash = [](const auto& image) { return hashOf(std::as_bytes(image.pixels())); };
+        PicturesKey key{view.pruned, view.texture.isLinear(), view.noDepth, view.refined, {}};
+        key.hashes = {key.linear ? hash(*view.texture.rgbaFloat()) : hash(*view.texture.rgba8()),
+                      hash(view.depth),
+                      hash(view.normal),
+                      hash(view.splatU),
+                      hash(view.splatV),
+                      hash(view.metallicRoughness),
+                      hash(view.emissive)};
+        return key;
+    }
+};
 
 }  // namespace stx

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 
 namespace stx {
 namespace {
@@ -64,6 +65,28 @@ class ChangedByView : public Sequence {
     ViewChange change_;
 };
 
+class InEnvironment : public Sequence {
+  public:
+    InEnvironment(std::unique_ptr<Sequence> frames, std::shared_ptr<const Environment> environment)
+        : frames_(std::move(frames)), environment_(std::move(environment)) {
+        timeline_ = frames_->timeline();
+    }
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        STX_TRY(auto bundle, frames_->frame(index, job));
+        bundle.environment = environment_;
+        return bundle;
+    }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        STX_TRY(auto table, frames_->views(index, job));
+        table->about().environment = environment_;
+        return table;
+    }
+
+  private:
+    std::unique_ptr<Sequence> frames_;
+    std::shared_ptr<const Environment> environment_;
+};
+
 class Watched : public Sequence {
   public:
     using Look = std::function<void(std::size_t, std::size_t, const ReferenceView&)>;
@@ -121,19 +144,38 @@ class AcrossDamage : public Sequence {
         timeline_ = frames_->timeline();
     }
     Result<Bundle> frame(std::size_t index, Job& job) override {
-        auto bundle = attempt(index, job);
-        if (bundle || !isDamage(bundle.error())) return bundle;
-        const Error error = bundle.error();
+        STX_TRY(auto bundle, nearest<Bundle>(index, job, [this](std::size_t frame, Job& part) {
+                    return frames_->frame(frame, part);
+                }));
+        setTime(bundle, index);
+        return bundle;
+    }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        STX_TRY(auto table, nearest<std::unique_ptr<ViewTable>>(
+                                index, job, [this](std::size_t frame, Job& part) {
+                                    return soundViews(frame, part);
+                                }));
+        setTime(table->about(), index);
+        return table;
+    }
+
+  private:
+    /// The frame itself, or what is shown in its place.
+    template <class T, class Read>
+    Result<T> nearest(std::size_t index, Job& job, const Read& read) {
+        auto found = attempt<T>(index, job, read);
+        if (found || !isDamage(found.error())) return found;
+        const Error error = found.error();
         const auto go = [&](std::size_t to) -> Result<void> {
             STX_CHECK(job.checkCancelled());
-            bundle = attempt(to, job);
-            if (!bundle && !isDamage(bundle.error())) return tl::unexpected(bundle.error());
+            found = attempt<T>(to, job, read);
+            if (!found && !isDamage(found.error())) return tl::unexpected(found.error());
             return {};
         };
-        for (std::size_t i = index; !bundle && i > 0;) STX_CHECK(go(--i));
-        const bool before = bundle.has_value();
-        for (std::size_t i = index + 1; !bundle && i < timeline_.count(); ++i) STX_CHECK(go(i));
-        if (!bundle) return tl::unexpected(error);
+        for (std::size_t i = index; !found && i > 0;) STX_CHECK(go(--i));
+        const bool before = found.has_value();
+        for (std::size_t i = index + 1; !found && i < timeline_.count(); ++i) STX_CHECK(go(i));
+        if (!found) return tl::unexpected(error);
         if (!noted_)
             job.noteAbove(fmt::format(
                 "frame {} ({:.6g} s) cannot be used: {} is shown in its place, and no more is said "
@@ -141,25 +183,42 @@ class AcrossDamage : public Sequence {
                 index, timeline_.times[index], before ? "the one before it" : "the first that can",
                 error.text()));
         noted_ = true;
-        setTime(*bundle, index);
-        return bundle;
+        return found;
     }
 
-  private:
     /// A frame, unless it is known to be damaged. Its notes are passed on when it is there.
-    Result<Bundle> attempt(std::size_t index, Job& job) {
+    template <class T, class Read>
+    Result<T> attempt(std::size_t index, Job& job, const Read& read) {
         if (const auto known = damaged_.find(index); known != damaged_.end())
             return tl::unexpected(known->second);
         Job part;
         part.workFor(job);
-        auto bundle = frames_->frame(index, part);
-        if (!bundle && isDamage(bundle.error())) damaged_.emplace(index, bundle.error());
-        if (bundle) part.passNotesOn();
-        return bundle;
+        Result<T> found = read(index, part);
+        if (!found && isDamage(found.error())) damaged_.emplace(index, found.error());
+        if (found) part.passNotesOn();
+        return found;
+    }
+
+    /// Views whose pixels are not damaged: that a view is shows when it is read, and then another
+    /// frame is shown, of which all views are. Each is read once for it, the first time.
+    Result<std::unique_ptr<ViewTable>> soundViews(std::size_t index, Job& job) {
+        STX_TRY(auto table, frames_->views(index, job));
+        if (table->knownSound() || sound_.contains(index)) return table;
+        if (memoryOfAll(*table, {"reading", 0}) <= heldWhole(job.limits)) {
+            STX_TRY(auto bundle, wholeBundle(std::move(table), job));
+            return tableOf(std::move(bundle));
+        }
+        Job quiet;  // notes are those of the views when they are asked for
+        quiet.workFor(job);
+        STX_CHECK(forEachView(*table, {"reading", 0}, quiet,
+                              [](std::size_t, const auto&) { return Result<void>(); }));
+        sound_.insert(index);
+        return table;
     }
 
     std::unique_ptr<Sequence> frames_;
     std::map<std::size_t, Error> damaged_;
+    std::set<std::size_t> sound_;  ///< frames whose views have been read
     bool noted_ = false;
 };
 
@@ -265,6 +324,11 @@ std::unique_ptr<Sequence> changed(std::unique_ptr<Sequence> frames,
 
 std::unique_ptr<Sequence> changedByView(std::unique_ptr<Sequence> frames, ViewChange change) {
     return std::make_unique<ChangedByView>(std::move(frames), std::move(change));
+}
+
+std::unique_ptr<Sequence> withEnvironment(std::unique_ptr<Sequence> frames,
+                                          std::shared_ptr<const Environment> environment) {
+    return std::make_unique<InEnvironment>(std::move(frames), std::move(environment));
 }
 
 std::unique_ptr<Sequence> watched(

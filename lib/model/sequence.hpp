@@ -97,6 +97,10 @@ class Sequence {
 [[nodiscard]] std::unique_ptr<Sequence> changedByView(std::unique_ptr<Sequence> frames,
                                                       ViewChange change);
 
+/// The same frames with another environment, which may be null.
+[[nodiscard]] std::unique_ptr<Sequence> withEnvironment(
+    std::unique_ptr<Sequence> frames, std::shared_ptr<const Environment> environment);
+
 /// The same frames; `look` is called, from any thread, with each view that is asked for, each time.
 [[nodiscard]] std::unique_ptr<Sequence> watched(
     std::unique_ptr<Sequence> frames,

@@ -75,6 +75,7 @@ class SpooledViews : private OwnSpool, public ViewTable {
 
     std::uint64_t bytesHeld() const override { return held_; }
     std::uint64_t bytesGiven(std::size_t) const override { return 0; }
+    bool knownSound() const override { return true; }
 
   protected:
     Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job&) const override {
@@ -120,6 +121,7 @@ class ChangedViews : public ViewTable {
         return change_.keepsPixels ? table_->summaries() : std::vector<ViewSummary>();
     }
     std::string where() const override { return table_->where(); }
+    bool knownSound() const override { return table_->knownSound(); }
     int mostAtOnce() const override { return table_->mostAtOnce(); }
 
   protected:
@@ -134,6 +136,42 @@ class ChangedViews : public ViewTable {
   private:
     std::unique_ptr<ViewTable> table_;
     ViewChange change_;
+};
+
+class OtherHeaders : public ViewTable {
+  public:
+    OtherHeaders(std::unique_ptr<ViewTable> table, const std::vector<ViewHeader>& headers)
+        : ViewTable(headersOf(std::as_const(*table).about()), table->kinds()),
+          table_(std::move(table)) {
+        for (std::size_t i = 0; i < count(); ++i) setHeader(about().views[i], headers[i]);
+    }
+
+    std::uint64_t bytesHeld() const override { return table_->bytesHeld(); }
+    std::uint64_t bytesToMake(std::size_t index) const override {
+        return std::max(table_->bytesToMake(index), bytesOf(index));
+    }
+    std::string where() const override { return table_->where(); }
+    bool knownSound() const override { return table_->knownSound(); }
+    int mostAtOnce() const override { return table_->mostAtOnce(); }
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
+        STX_TRY(auto read, table_->view(index, job));
+        auto view = ownView(std::move(read));
+        setHeader(*view, about().views[index]);
+        return view;
+    }
+
+  private:
+    static void setHeader(ReferenceView& view, const ViewHeader& header) {
+        ViewHeader own = header;
+        own.name = std::move(view.name);
+        own.camera = view.camera;
+        own.colourFile = std::move(view.colourFile);
+        static_cast<ViewHeader&>(view) = std::move(own);
+    }
+
+    std::unique_ptr<ViewTable> table_;
 };
 
 class WatchedViews : public ViewTable {
@@ -152,6 +190,7 @@ class WatchedViews : public ViewTable {
     }
     std::vector<ViewSummary> summaries() const override { return table_->summaries(); }
     std::string where() const override { return table_->where(); }
+    bool knownSound() const override { return table_->knownSound(); }
     int mostAtOnce() const override { return table_->mostAtOnce(); }
 
   protected:
@@ -299,6 +338,11 @@ std::unique_ptr<ViewTable> changedViews(std::unique_ptr<ViewTable> table, ViewCh
     return std::make_unique<ChangedViews>(std::move(table), std::move(kinds), std::move(change));
 }
 
+std::unique_ptr<ViewTable> withHeaders(std::unique_ptr<ViewTable> table,
+                                       const std::vector<ViewHeader>& headers) {
+    return std::make_unique<OtherHeaders>(std::move(table), headers);
+}
+
 std::unique_ptr<ViewTable> watchedViews(
     std::unique_ptr<ViewTable> table,
     std::function<void(std::size_t index, const ReferenceView& view)> look) {
@@ -323,6 +367,11 @@ std::uint64_t mostAtOnce(const ViewTable& table, const PeakMemory& work) {
 }
 
 }  // namespace
+
+std::uint64_t heldWhole(const Limits& limits) {
+    constexpr std::uint64_t kMost = 64u << 20, kPartOfLimit = 8;
+    return std::min(kMost, limits.maxMemoryBytes / kPartOfLimit);
+}
 
 std::uint64_t memoryOfEach(const ViewTable& table, const PeakMemory& work) {
     std::uint64_t most = 0;

@@ -50,6 +50,8 @@ class ViewTable {
     [[nodiscard]] const std::vector<ViewImageKinds>& kinds() const { return kinds_; }
     /// All pixels are in memory, in about().
     [[nodiscard]] bool whole() const { return whole_; }
+    /// Each view has been read once and was sound: it is damaged only if its file changed since.
+    [[nodiscard]] virtual bool knownSound() const { return whole_; }
     /// The planes in about() are those of the views. If not, they come with the pixels.
     [[nodiscard]] bool planesKnown() const { return planesKnown_; }
 
@@ -140,11 +142,17 @@ struct ViewChange {
 /// The same views, each changed when it is asked for.
 [[nodiscard]] std::unique_ptr<ViewTable> changedViews(std::unique_ptr<ViewTable> table,
                                                       ViewChange change);
+/// The same views with what these headers, one for each, say beside name, camera and colour file.
+[[nodiscard]] std::unique_ptr<ViewTable> withHeaders(std::unique_ptr<ViewTable> table,
+                                                     const std::vector<ViewHeader>& headers);
 /// The same views; `look` is called, from any thread, with each that is asked for, each time.
 [[nodiscard]] std::unique_ptr<ViewTable> watchedViews(
     std::unique_ptr<ViewTable> table,
     std::function<void(std::size_t index, const ReferenceView& view)> look);
 
+/// Views that would be read twice, and whose images take no more than so many bytes, are all in
+/// memory when they are opened as a table: that is faster, and hardly shows beside the program.
+[[nodiscard]] std::uint64_t heldWhole(const Limits& limits);
 /// Memory that forEachView() takes at most for such work on each view, and what work on all of them
 /// at once takes (checkPeak()), their images included, bytes.
 [[nodiscard]] std::uint64_t memoryOfEach(const ViewTable& table, const PeakMemory& work);

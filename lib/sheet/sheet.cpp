@@ -1,8 +1,10 @@
 #include "lib/sheet/sheet.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
+#include <utility>
 
 #include "lib/base/counted.hpp"
 #include "lib/base/printable.hpp"
@@ -194,16 +196,38 @@ struct SequenceCell {
     bool still = false;
 };
 
+/// Which views are background with the same pictures and camera in the first frame and the last.
+Result<std::vector<bool>> stillBackgrounds(Sequence& frames, const Bundle& first, Job& job) {
+    std::vector<bool> still(first.views.size());
+    if (std::ranges::none_of(first.views, &ReferenceView::background)) return still;
+    Job quiet;  // its notes come with the moments
+    quiet.workFor(job);
+    std::array<std::vector<PicturesKey>, 2> keys;
+    Bundle last;
+    for (const std::size_t end : {std::size_t{0}, std::size_t{1}}) {
+        STX_TRY(const auto table, frames.views(end * (frames.timeline().count() - 1), quiet));
+        keys[end].resize(table->count());
+        last = headersOf(std::as_const(*table).about());
+        STX_CHECK(forEachView(
+            *table, peak::kSheet, quiet,
+            [&](std::size_t i, const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
+                if (view->background) keys[end][i] = PicturesKey::of(*view);
+                return {};
+            }));
+    }
+    for (std::size_t i = 0; i < std::min(still.size(), last.views.size()); ++i)
+        still[i] = first.views[i].background && last.views[i].background &&
+                   first.views[i].camera == last.views[i].camera && keys[0][i] == keys[1][i];
+    return still;
+}
+
 /// Rows of a sheet: of each view that may change all moments, then background that stands still,
 /// once each.
-std::vector<std::vector<SequenceCell>> rowsOfViews(const Bundle& first, const Bundle& last,
-                                                   int moments) {
+std::vector<std::vector<SequenceCell>> rowsOfViews(const std::vector<bool>& stands, int moments) {
     std::vector<std::vector<SequenceCell>> rows;
     std::vector<SequenceCell> still;
-    for (std::size_t i = 0; i < first.views.size(); ++i) {
-        const ReferenceView& view = first.views[i];
-        if (view.background && i < last.views.size() && view.camera == last.views[i].camera &&
-            samePictures(view, last.views[i])) {
+    for (std::size_t i = 0; i < stands.size(); ++i) {
+        if (stands[i]) {
             still.push_back({i, 0, true});
             continue;
         }
@@ -217,23 +241,32 @@ std::vector<std::vector<SequenceCell>> rowsOfViews(const Bundle& first, const Bu
     return rows;
 }
 
+/// As many rows as hold `shown` cells, evenly chosen: rows are whole, and those of the moments come
+/// before what stands still.
+std::vector<SequenceCell> shownCells(const std::vector<std::vector<SequenceCell>>& wanted,
+                                     int shown, int moments) {
+    const auto rows = static_cast<std::size_t>((shown + moments - 1) / moments);
+    std::vector<SequenceCell> cells;
+    for (std::size_t r = 0; r < rows; ++r) {
+        const auto& row = wanted[r * wanted.size() / rows];
+        cells.insert(cells.end(), row.begin(), row.end());
+    }
+    return cells;
+}
+
 }  // namespace
 
 Result<Sheet> sheetOf(Sequence& frames, const SheetSettings& settings, Job& job) {
     const Timeline timeline = frames.timeline();
     const int all = static_cast<int>(timeline.count());
     const int moments = std::min(settings.columns > 0 ? settings.columns : kMoments, all);
-    STX_TRY(auto first, frames.frame(0, job));
+    STX_TRY(auto table, frames.views(0, job));
+    const Bundle first = headersOf(std::as_const(*table).about());
     const std::size_t views = first.views.size();
-    const auto points = static_cast<std::size_t>(first.pointCount());
-    Bundle last;
-    if (std::ranges::any_of(first.views, &ReferenceView::background)) {
-        Job quiet;  // its notes come with the moments
-        quiet.workFor(job);
-        STX_TRY(last, frames.frame(static_cast<std::size_t>(all - 1), quiet));
-    }
-    const auto wanted = rowsOfViews(first, last, moments);
-    last = {};
+    // It does not serve when another frame is asked for.
+    if (std::ranges::any_of(first.views, &ReferenceView::background)) table.reset();
+    STX_TRY(const auto stands, stillBackgrounds(frames, first, job));
+    const auto wanted = rowsOfViews(stands, moments);
     SheetContent content;
     content.groups = 0;
     for (const auto& row : wanted) content.groups += static_cast<int>(row.size());
@@ -245,41 +278,45 @@ Result<Sheet> sheetOf(Sequence& frames, const SheetSettings& settings, Job& job)
     SheetSettings fixed = settings;
     fixed.columns = moments;
     STX_TRY(auto plan, planSheet(content, fixed, job.limits));
-    // Rows are whole, and those of the moments come before what stands still.
-    const auto rows = static_cast<std::size_t>((plan.shown + moments - 1) / moments);
-    std::vector<SequenceCell> cells;
-    for (std::size_t r = 0; r < rows; ++r) {
-        const auto& row = wanted[r * wanted.size() / rows];
-        cells.insert(cells.end(), row.begin(), row.end());
-    }
+    const auto cells = shownCells(wanted, plan.shown, moments);
     plan.shown = static_cast<int>(cells.size());
     std::vector<SheetGroup> groups(cells.size());
     std::vector<Image<float>> depths(cells.size());
     std::vector<ValueRange> ranges(views);
+    std::atomic<std::int64_t> points = 0;
     for (int m = 0; m < moments; ++m) {
         STX_CHECK(job.checkCancelled());
         // From the first frame to the last.
         const auto frame = static_cast<std::size_t>(
             moments == 1 ? 0 : static_cast<std::int64_t>(m) * (all - 1) / (moments - 1));
-        Result<Bundle> bundle = Bundle();
-        if (frame == 0)
-            bundle = std::move(first);
-        else
-            bundle = frames.frame(frame, job);
-        if (!bundle)
+        const auto look = [&](std::size_t k,
+                              const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
+            if (m == 0) points += view->pointCount();
+            for (std::size_t i = 0; i < cells.size(); ++i) {
+                if (cells[i].moment != m || cells[i].view != k) continue;
+                groups[i].lines = {nameText(*view, k),
+                                   cells[i].still ? std::string("background that stands still")
+                                                  : fmt::format("{:.3f} s, frame {}",
+                                                                timeline.times[frame], frame)};
+                groups[i].tiles.push_back(colourTile(view->texture, plan.cell));
+                ranges[k].add(rangeOf(view->depth));
+                depths[i] = shrunkValues(view->depth, plan.cell);
+            }
+            return {};
+        };
+        auto looked = [&]() -> Result<void> {
+            Job quiet;  // the notes of the first have been said, but for those of its views
+            quiet.workFor(job);
+            if (m > 0) table.reset();
+            if (!table) {
+                STX_TRY(table, frames.views(frame, frame == 0 ? quiet : job));
+            }
+            STX_CHECK(checkSameViews(first, std::as_const(*table).about()));
+            return forEachView(*table, peak::kSheet, job, look);
+        }();
+        if (!looked)
             return tl::unexpected(
-                bundle.error().at(fmt::format("at {:g} s", timeline.times[frame])));
-        for (std::size_t i = 0; i < cells.size(); ++i) {
-            if (cells[i].moment != m) continue;
-            const ReferenceView& view = bundle->views[cells[i].view];
-            groups[i].lines = {
-                nameText(view, cells[i].view),
-                cells[i].still ? std::string("background that stands still")
-                               : fmt::format("{:.3f} s, frame {}", timeline.times[frame], frame)};
-            groups[i].tiles.push_back(colourTile(view.texture, plan.cell));
-            ranges[cells[i].view].add(rangeOf(view.depth));
-            depths[i] = shrunkValues(view.depth, plan.cell);
-        }
+                looked.error().at(fmt::format("at {:g} s", timeline.times[frame])));
         job.progress(m + 1, moments, "moments");
     }
     for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -287,12 +324,12 @@ Result<Sheet> sheetOf(Sequence& frames, const SheetSettings& settings, Job& job)
         groups[i].tiles.push_back({falseColour(depths[i], range, kEmptyColour),
                                    rangeText("depth", range), !range.empty()});
     }
-    const auto header =
-        headerOf(plan, settings,
-                 fmt::format("{} of {} over {:.4g} s, {}, {} in the first",
-                             counted(static_cast<std::size_t>(moments), "moment"),
-                             counted(timeline.count(), "frame"), timeline.duration(),
-                             counted(views, "view"), counted(points, "point")));
+    const auto header = headerOf(
+        plan, settings,
+        fmt::format("{} of {} over {:.4g} s, {}, {} in the first",
+                    counted(static_cast<std::size_t>(moments), "moment"),
+                    counted(timeline.count(), "frame"), timeline.duration(), counted(views, "view"),
+                    counted(static_cast<std::size_t>(points.load()), "point")));
     return Sheet{drawSheet(plan, header, groups), plan.shown, content.groups};
 }
 

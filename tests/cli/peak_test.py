@@ -7,11 +7,13 @@ do not fit memory is the same.
     tests/cli/peak_test.py build/release/bin/stx MODEL.obj SHARED_DIR --measure 1 --pixels 52
     tests/cli/peak_test.py build/release/bin/stx MODEL.obj SHARED_DIR --only many --measure 1
 """
+import hashlib
 import json
 import math
 import os
 import random
 import re
+import shutil
 import struct
 import sys
 import tempfile
@@ -154,7 +156,7 @@ def many_views(args, folder):
     for count in counts:
         must([args.stx, "convert", model, "-o", f"many{count}.exr"] + views(count), folder)
         must([args.stx, "convert", f"many{count}.exr", "-o", f"many{count}.mp4"], folder)
-        # What a set takes in memory where it is small (heldOfSets()) is more than what 36 views take one by one.
+        # What a set takes in memory where it is small (heldWhole()) is more than what 36 views take one by one.
         must([args.stx, "extract", f"many{count}.exr", "-o", f"many{count}set"], folder)
     for number, (name, line) in enumerate(of_many()):
         if args.only not in "many " + name:
@@ -253,11 +255,15 @@ NOISY = {"refine exr": "refine {} -o OUT.exr", "refine mp4": "refine {} -o OUT.m
 
 
 def files_of(path):
-    """What is in a file, or in those of a folder."""
+    """What tells a file, or those of a folder, from others. Not their bytes: a process counts those of the one that starts it."""
+    def digest(file):
+        with open(file, "rb") as opened:
+            return hashlib.file_digest(opened, "sha256").digest()
+
     if not os.path.isdir(path):
-        return open(path, "rb").read()
-    return {name: open(os.path.join(path, name), "rb").read() for name in sorted(os.listdir(path))
-            if os.path.isfile(os.path.join(path, name))}
+        return digest(path)
+    return {os.path.relpath(os.path.join(folder, name), path): digest(os.path.join(folder, name))
+            for folder, _, names in os.walk(path) for name in names}
 
 
 def noisy_of_many(args, folder):
@@ -350,34 +356,93 @@ def cube_of_few(args, folder):
     return wrong
 
 
-def film_of_few(args, folder):
-    """What is not the same, or takes too much, of pictures of a film whose frames do not fit memory."""
-    wrong = []
-    modes = [mode for mode in ("surface", "splat") if args.only in f"film {mode}"]
-    if not modes:
-        return wrong
-    film = os.path.join(folder, "film")
-    turned_set(film, TURNED_VIEWS, 512)
-    png(os.path.join(film, "later.png"), 512, 512, "rgb", lambda y: bytes(v for x in range(512) for v in (90, x // 2, y // 2)))
-    with open(os.path.join(film, "transforms.json"), encoding="utf-8") as file:
+def film_set(folder, count, side):
+    """Two moments of a ball from inside."""
+    turned_set(folder, count, side)
+    png(os.path.join(folder, "later.png"), side, side, "rgb", lambda y: bytes(v for x in range(side) for v in (90, x * 255 // side, y * 255 // side)))
+    with open(os.path.join(folder, "transforms.json"), encoding="utf-8") as file:
         scene = json.load(file)
     scene["frames"] = [view | {"camera": i, "time": moment, "file_path": picture}
                        for moment, picture in ((0, "c.png"), (1, "later.png")) for i, view in enumerate(scene["frames"])]
-    write(os.path.join(film, "transforms.json"), json.dumps(scene))
-    must([args.stx, "convert", "film", "-o", "film.exr"], folder)
-    for mode in modes:
-        name, pictures = f"film {mode}", []
+    write(os.path.join(folder, "transforms.json"), json.dumps(scene))
+
+
+def film_of_few(args, folder):
+    """What is not the same, or takes too much, of pictures of a film whose frames do not fit memory."""
+    wrong = []
+    films = [(mode, film) for mode in ("surface", "splat") for film in ("film_%d.exr", "film.mp4", "film") if args.only in f"film {mode} {film}"]
+    if not films:
+        return wrong
+    film_set(os.path.join(folder, "film"), TURNED_VIEWS, 512)
+    for film in ("film_%d.exr", "film.mp4"):
+        must([args.stx, "convert", "film", "-o", film], folder)
+    for number, (mode, film) in enumerate(films):
+        name, pictures = f"film {mode} {film}", []
         for limit in (NOISY_IN_MEMORY, CUBE_LIMIT):
-            done = must([args.stx, "render", "film.exr", "-o", f"{mode}{limit}/%d.png", "--mode", mode, "--times", "all", "--orbit", "2", "--size", "256x256",
-                         "--threads", "2", "--max-memory", str(limit)], folder)
-            pictures.append(files_of(os.path.join(folder, f"{mode}{limit}")))
+            done = must([args.stx, "render", film, "-o", f"shown{number}_{limit}/%d.png", "--mode", mode, "--times", "all", "--size", "256x256",
+                         "--threads", "2", "--max-memory", str(limit)] + "--eye 0.1,0,0 --target 0,0,-3".split(), folder)
+            pictures.append(files_of(os.path.join(folder, f"shown{number}_{limit}")))
             peak = done.usage.ru_maxrss / 1024
             if args.measure:
-                print(f"{name:20} {peak:6.1f} MiB at --max-memory {limit}", flush=True)
+                print(f"{name:25} {peak:6.1f} MiB at --max-memory {limit}", flush=True)
             elif limit == CUBE_LIMIT and peak > limit + PROGRAM:
                 wrong.append(f"{name}: {peak:.1f} MiB at --max-memory {limit}")
-        if len(pictures[0]) != 2 or pictures[0] != pictures[1]:
+        if len(set(pictures[0].values())) != 2 or pictures[0] != pictures[1]:
             wrong.append(f"{name}: its pictures are not those of a larger --max-memory")
+    return wrong
+
+
+# Of films of 512²: how many views, and a limit under which no frame of them is held whole and decoded pictures of both fill
+# their part, MiB.
+FILM_VIEWS, FILM_LIMIT = (12, 36), 64
+# What converts a film. {} is its name without the ending.
+FILMS = {"exr to exr": "convert {}_%d.exr -o OUT_%d.exr", "exr to mp4": "convert {}_%d.exr -o OUT.mp4",
+         "mp4 to exr": "convert {}.mp4 -o OUT_%d.exr", "mp4 to mp4": "convert {}.mp4 -o OUT.mp4 --depth-bits 8",
+         "to jpeg": "convert {}.mp4 -o OUT.mp4 --colour jpeg",
+         "set to exr": "convert {} -o OUT_%d.exr", "set to mp4": "convert {} -o OUT.mp4",
+         "folder of exr": "extract {}_%d.exr -o OUT --refine off", "folder of mp4": "extract {}.mp4 -o OUT --refine off",
+         "sheet of exr": "sheet {}_%d.exr -o OUT.png --refine off", "sheet of mp4": "sheet {}.mp4 -o OUT.png --refine off"}
+
+
+def film_of_many(args, folder):
+    """What takes more for films of many views than of few, or is not the same as from memory."""
+    wrong = []
+    rows = {name: line for name, line in FILMS.items() if args.only in f"films {name}"}
+    if not rows:
+        return wrong
+    for count in FILM_VIEWS:
+        film_set(os.path.join(folder, f"film{count}"), count, 512)
+        for film in (f"film{count}_%d.exr", f"film{count}.mp4"):
+            must([args.stx, "convert", f"film{count}", "-o", film], folder)
+    for number, (name, line) in enumerate(rows.items()):
+        def converted(count, limit=FILM_LIMIT):
+            words = line.replace("OUT", f"films/{number}").replace("{}", f"film{count}").split()
+            os.makedirs(os.path.join(folder, "films"))
+            done = must([args.stx] + words + ["--threads", "2", "--max-memory", str(limit)], folder)
+            made = files_of(os.path.join(folder, "films"))
+            shutil.rmtree(os.path.join(folder, "films"))
+            return done.usage.ru_maxrss / 1024, made
+
+        few = converted(FILM_VIEWS[0])[0]
+        many, made = converted(FILM_VIEWS[1])
+        in_memory, expected = converted(FILM_VIEWS[1], NOISY_IN_MEMORY)
+        # Views of a set are compared.
+        more = COMPARED * (FILM_VIEWS[1] - FILM_VIEWS[0]) if name.startswith("set") else 0
+        for _ in range(0 if args.measure else TRIES):
+            if many > MOST * few + more:
+                few, many = max(few, converted(FILM_VIEWS[0])[0]), min(many, converted(FILM_VIEWS[1])[0])
+        if args.measure:
+            print(f"films {name:21} {few:6.1f} MiB of {FILM_VIEWS[0]} views, {many:6.1f} of {FILM_VIEWS[1]}: {many / few:.2f}; in memory {in_memory:.1f}", flush=True)
+        elif many > MOST * few + more:
+            wrong.append(f"films {name}: {many:.1f} MiB of {FILM_VIEWS[1]} views, {few:.1f} of {FILM_VIEWS[0]}")
+        if name.startswith(("set", "exr")):  # of MPEG-4 decoded pictures are kept beside
+            source = line.split()[1].replace("{}", f"film{FILM_VIEWS[1]}")
+            found = json.loads(must([args.stx, "info", source, "--memory", "--threads", "2", "--format", "json"], folder).out)["memory"]
+            said, = (row for row in found["commands"] if row["command"] == "convert -o NAME." + name.split()[2])
+            if said["views"] != "one for each thread" or in_memory > said["bytes"] / (1 << 20) + PROGRAM:
+                wrong.append(f"films {name}: {in_memory:.1f} MiB, but stx info --memory says {said}")
+        if made != expected:
+            wrong.append(f"films {name}: it is not that of a larger --max-memory")
     return wrong
 
 
@@ -508,6 +573,7 @@ def main():
         wrong += noisy_of_many(args, folder)
         wrong += cube_of_few(args, folder)
         wrong += film_of_few(args, folder)
+        wrong += film_of_many(args, folder)
     print("\n".join(wrong))
     sys.exit(1 if wrong else 0)
 

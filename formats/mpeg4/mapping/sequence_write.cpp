@@ -2,17 +2,19 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "formats/mpeg4/mapping/media_clock.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mapping/video_write.hpp"
 #include "formats/mpeg4/mapping/view_images.hpp"
 #include "formats/video/video_process.hpp"
-#include "lib/base/parallel.hpp"
 #include "lib/model/same_pictures.hpp"
+#include "lib/model/view_table.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -35,21 +37,48 @@ const Bytes& imageOf(const ViewImages& images, std::size_t role) {
     return *all[role];
 }
 
-/// Whether two frames of a view are coded alike: the lens counts, too, as pictures are padded by
-/// it.
-bool codedAlike(const ReferenceView& a, const ReferenceView& b) {
-    const Camera &c = a.camera, &d = b.camera;
-    return c.orthographic == d.orthographic && c.fx == d.fx && c.fy == d.fy && c.cx == d.cx &&
-           c.cy == d.cy && samePictures(a, b);
-}
+/// A frame of a view, when its pixels are gone.
+struct ViewBefore {
+    ViewHeader header;
+    PicturesKey pictures;
+
+    static ViewBefore of(const ReferenceView& view) {
+        ViewBefore before{view, PicturesKey::of(view)};
+        before.header.colourFile = {};
+        return before;
+    }
+    /// Whether both are coded alike: the lens counts, too, as pictures are padded by it.
+    [[nodiscard]] bool codedAs(const ViewBefore& other) const {
+        const Camera &c = header.camera, &d = other.header.camera;
+        return c.orthographic == d.orthographic && c.fx == d.fx && c.fy == d.fy && c.cx == d.cx &&
+               c.cy == d.cy && pictures == other.pictures;
+    }
+};
+
+/// An image that was coded, without its bytes.
+struct CodedImage {
+    std::size_t size = 0, hash = 0;
+
+    static CodedImage of(const Bytes& bytes) { return {bytes.size(), hashOf(bytes)}; }
+    bool operator==(const CodedImage&) const = default;
+};
+
+/// A frame of a view on its way: coded from several threads, then added in the views' order.
+struct ComingView {
+    ViewBefore view;
+    ViewImages images;
+    bool again = false;  ///< of its images only the padding is there: they are those before
+};
 
 /// A view on its way into the document.
 struct ViewTrack {
     NodePtr node;  ///< the DepthImage that is shown now
     Camera camera;
-    ReferenceView before;  ///< of the frame before
+    ViewBefore before;
     std::array<ElementaryStream*, kRoles.size()> streams{};
-    std::array<Bytes, kRoles.size()> last;
+    std::array<CodedImage, kRoles.size()> last;
+    /// In the spool, until colour and depth become video: the planes that they begin with.
+    std::array<ByteRange, 2> planes;
     std::array<bool, kRoles.size()> changed{};
     std::array<int, 2> video{-1, -1};  ///< of colour and depth in H.264: VideoStreams' number
 };
@@ -75,8 +104,10 @@ class SequenceWriter {
             job_.progress(static_cast<std::int64_t>(count + i),
                           static_cast<std::int64_t>(2 * count), "writing frames");
             STX_CHECK(job_.checkCancelled());
-            STX_TRY(auto bundle, frame(i));
-            if (auto done = add(bundle, i); !done)
+            Job quiet;
+            quiet.workFor(job_);
+            STX_TRY(const auto table, frame(i, quiet));
+            if (auto done = add(*table, i, quiet); !done)
                 return tl::unexpected(done.error().at(placeOf(i)));
         }
         STX_CHECK(finish());
@@ -92,14 +123,16 @@ class SequenceWriter {
         return ticksAt(seconds - frames_.timeline().start(), scale_);
     }
 
-    /// A frame with the ranges of the sequence. Its notes are said once, of the first frame.
-    Result<Bundle> frame(std::size_t i) {
-        Job quiet;
-        quiet.workFor(job_);
-        auto bundle = frames_.frame(i, i == 0 && ranges_.empty() ? job_ : quiet);
-        if (!bundle) return tl::unexpected(bundle.error().at(placeOf(i)));
-        for (std::size_t k = 0; k < ranges_.size(); ++k) {
-            ReferenceView& view = bundle->views[k];
+    /// A frame, with the ranges of the sequence when these are known.
+    Result<std::unique_ptr<ViewTable>> frame(std::size_t i, Job& job) {
+        auto table = frames_.views(i, job);
+        if (!table) return tl::unexpected(table.error().at(placeOf(i)));
+        if (ranges_.empty()) return table;
+        std::vector<ViewHeader> headers;
+        for (const ReferenceView& view : std::as_const(**table).about().views)
+            headers.push_back(view);
+        for (std::size_t k = 0; k < std::min(headers.size(), ranges_.size()); ++k) {
+            ViewHeader& view = headers[k];
             view.nearPlane = ranges_[k].nearPlane;
             view.farPlane = ranges_[k].farPlane;
             view.depthBits = ranges_[k].depthBits;
@@ -109,45 +142,72 @@ class SequenceWriter {
             view.noDepth = unknown ? NoDepth::unknown : NoDepth::empty;
             view.refined = ranges_[k].refined;
         }
-        return bundle;
+        return withHeaders(std::move(*table), headers);
     }
 
     Result<void> findRanges() {
         const std::size_t count = frames_.timeline().count();
         std::vector<ViewRange> ranges;
-        Bundle first;
         for (std::size_t i = 0; i < count; ++i) {
             job_.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(2 * count),
                           "writing frames");
             STX_CHECK(job_.checkCancelled());
-            STX_TRY(auto bundle, frame(i));
+            // Notes are those of the first frame: of its views when they are written.
+            Job quiet;
+            quiet.workFor(job_);
+            STX_TRY(const auto table, frame(i, i == 0 ? job_ : quiet));
             if (i == 0) {
-                ranges.resize(bundle.views.size());
-                first = headersOf(bundle);
+                if (table->count() == 0) return Bundle().checkHeaders();
+                ranges.resize(table->count());
+                first_ = headersOf(std::as_const(*table).about());
             }
-            if (auto same = checkSameViews(first, bundle); !same)
-                return tl::unexpected(same.error().at(placeOf(i)));
-            const Bounds here = bundle.bounds ? *bundle.bounds : bundle.computeBounds();
-            if (!here.empty()) {
-                bounds_.add(here.min);
-                bounds_.add(here.max);
-            }
-            for (std::size_t k = 0; k < ranges.size(); ++k)
-                if (auto done = widen(ranges[k], bundle.views[k], i == 0); !done)
-                    return tl::unexpected(done.error().at(
-                        fmt::format("{}: view '{}'", placeOf(i), bundle.views[k].name)));
+            auto looked = checkSameViews(first_, std::as_const(*table).about());
+            if (looked) looked = lookAt(*table, ranges, i == 0, quiet);
+            if (!looked) return tl::unexpected(looked.error().at(placeOf(i)));
         }
         ranges_ = std::move(ranges);
         return {};
     }
-    Result<void> widen(ViewRange& range, const ReferenceView& view, bool first) const {
+    /// Widens ranges and bounds by a frame, whose pixels are read where its headers do not tell
+    /// all.
+    Result<void> lookAt(const ViewTable& table, std::vector<ViewRange>& ranges, bool first,
+                        Job& job) {
+        const Bundle& about = table.about();
+        std::vector<Bounds> bounds(table.count());
+        const auto look = [&](std::size_t k, const ViewHeader& view,
+                              float longestSplat) -> Result<void> {
+            if (auto done = widen(ranges[k], view, table.kindsOf(k), longestSplat, first); !done)
+                return tl::unexpected(done.error().at(fmt::format("view '{}'", view.name)));
+            return {};
+        };
+        if (about.bounds && table.planesKnown() &&
+            std::ranges::none_of(table.kinds(), &ViewImageKinds::hasSplats)) {
+            for (std::size_t k = 0; k < table.count(); ++k) STX_CHECK(look(k, about.views[k], 0));
+        } else {
+            STX_CHECK(forEachView(
+                table, {"reading", 0}, job,
+                [&](std::size_t k, std::shared_ptr<const ReferenceView> view) -> Result<void> {
+                    if (!about.bounds) bounds[k] = view->computeBounds();
+                    return look(k, *view, view->hasSplats() ? longestSplatOf(*view) : 0);
+                }));
+        }
+        if (about.bounds) bounds = {*about.bounds};
+        for (const Bounds& here : bounds) {
+            if (here.empty()) continue;
+            bounds_.add(here.min);
+            bounds_.add(here.max);
+        }
+        return {};
+    }
+    Result<void> widen(ViewRange& range, const ViewHeader& view, const ViewImageKinds& kinds,
+                       float longestSplat, bool first) const {
         if (first) {
-            range.normals = view.hasNormals();
-            range.splats = view.hasSplats();
+            range.normals = kinds.normal;
+            range.splats = kinds.hasSplats();
             range.refined.steps = view.refined.steps;
         }
         range.refined.doubt = std::max(range.refined.doubt, view.refined.doubt);
-        if (range.normals != view.hasNormals() || range.splats != view.hasSplats())
+        if (range.normals != kinds.normal || range.splats != kinds.hasSplats())
             return fail(ErrorCode::unsupported,
                         "normals or splats are there in some frames only; bake all or none");
         if (view.pruned && (asVideo() || options_.texture == SceneWriteOptions::Texture::jpeg))
@@ -161,19 +221,24 @@ class SequenceWriter {
         range.nearPlane = std::min(range.nearPlane, view.nearPlane);
         range.farPlane = std::max(range.farPlane, view.farPlane);
         range.depthBits = std::max(range.depthBits, view.depthBits);
-        if (view.hasSplats())
-            range.longestSplat = std::max(range.longestSplat, longestSplatOf(view));
+        range.longestSplat = std::max(range.longestSplat, longestSplat);
         return {};
     }
 
     /// The document of the first frame, whose streams the others go into.
     Result<void> begin() {
-        STX_TRY(auto bundle, frame(0));
-        bundle.bounds = bounds_;
+        Job quiet;  // the notes of the frame have been said, but for those of its views
+        quiet.workFor(job_);
+        STX_TRY(auto table, frame(0, quiet));
+        table->about().bounds = bounds_;
         SceneWriteOptions options = options_;
         for (const ViewRange& range : ranges_)
             options.splatRanges.push_back(range.splats ? range.longestSplat : 0);
-        STX_TRY(document_, sceneFromBundle(bundle, options, job_));
+        std::vector<ViewBefore> before(table->count());
+        table = watchedViews(std::move(table), [&](std::size_t k, const ReferenceView& view) {
+            before[k] = ViewBefore::of(view);
+        });
+        STX_TRY(document_, sceneFromViews(*table, options, &spool_, job_));
         scale_ = frames_.timeline().timescale();
         document_.sceneStream.timescale = scale_;
         const Timeline& timeline = frames_.timeline();
@@ -181,6 +246,12 @@ class SequenceWriter {
         video_.emplace(options_.h264,
                        span > 0 ? static_cast<double>(timeline.count() - 1) / span : 25.0,
                        job_.limits, [this](const Bytes& bytes) { return spool_.add(bytes); });
+        STX_CHECK(beginTracks(before));
+        return asVideo() ? keepPlanes(*table, quiet) : Result<void>();
+    }
+
+    /// The streams of the nodes of views.
+    Result<void> beginTracks(const std::vector<ViewBefore>& before) {
         std::map<int, ElementaryStream*> streams;
         for (OdFrame& odFrame : document_.odFrames)
             for (OdCommand& command : odFrame.commands)
@@ -192,7 +263,8 @@ class SequenceWriter {
             if (node->info->find("diTexture") < 0) continue;
             ViewTrack track;
             track.node = node;
-            track.camera = bundle.views[tracks_.size()].camera;
+            track.before = before[tracks_.size()];
+            track.camera = track.before.header.camera;
             const NodePtr& texture = node->get<NodePtr>("diTexture");
             for (std::size_t r = 0; r < kRoles.size(); ++r) {
                 const int field = texture->info->find(kRoles[r]);
@@ -201,50 +273,82 @@ class SequenceWriter {
                 if (!image) continue;
                 const auto& urls = image->get<std::vector<Url>>("url");
                 ElementaryStream* stream = streams.at(urls.front().objectDescriptorId);
-                STX_TRY(track.last[r], stream->samples[0].data.load(job_.limits));
-                STX_TRY(stream->samples[0].data, spool_.add(track.last[r]));
+                STX_TRY(const Bytes picture, stream->samples[0].data.load(job_.limits));
+                track.last[r] = CodedImage::of(picture);
                 stream->timescale = scale_;
                 stream->samples[0].time = ticks(frames_.timeline().times[0]);
                 track.streams[r] = stream;
             }
             tracks_.push_back(std::move(track));
         }
-        first_ = headersOf(bundle);
-        for (std::size_t k = 0; k < tracks_.size(); ++k) {
-            if (asVideo()) {
-                auto images = imagesOf(bundle.views[k], k);
-                if (!images)
-                    return tl::unexpected(
-                        images.error().at(fmt::format("view '{}'", bundle.views[k].name)));
-                tracks_[k].last[0] = std::move(images->texture);
-                tracks_[k].last[1] = std::move(images->depth);
-                worstDepth_ = std::max(worstDepth_, images->worstDepth);
-            }
-            tracks_[k].before = std::move(bundle.views[k]);
-        }
         return {};
     }
+    /// The planes of the first frame, for what becomes video later.
+    Result<void> keepPlanes(const ViewTable& table, Job& job) {
+        return coded(
+            table, job, [](const ViewBefore&, std::size_t) { return false; },
+            [&](std::size_t k, const ComingView& coming) -> Result<void> {
+                ViewTrack& track = tracks_[k];
+                for (std::size_t r = 0; r < track.planes.size(); ++r) {
+                    const Bytes& planes = imageOf(coming.images, r);
+                    STX_TRY(track.planes[r], spool_.add(planes));
+                    track.last[r] = CodedImage::of(planes);
+                }
+                worstDepth_ = std::max(worstDepth_, coming.images.worstDepth);
+                return {};
+            });
+    }
 
-    Result<void> add(Bundle& bundle, std::size_t index) {
-        STX_CHECK(checkSameViews(first_, bundle));
-        std::vector<Result<ViewImages>> images(bundle.views.size());
-        parallelFor(0, static_cast<std::int64_t>(images.size()), [&](std::int64_t i) {
-            const auto k = static_cast<std::size_t>(i);
+    /// Codes the views of a frame but those that are there `again`, and takes them in their order.
+    Result<void> coded(
+        const ViewTable& table, Job& job,
+        const std::function<bool(const ViewBefore& view, std::size_t k)>& again,
+        const std::function<Result<void>(std::size_t k, const ComingView& coming)>& take) {
+        const bool vectors = std::ranges::any_of(
+            table.kinds(), [](const auto& kinds) { return kinds.normal || kinds.hasSplats(); });
+        const auto placed = [&](const Result<void>& done, std::size_t k) -> Result<void> {
+            if (done) return {};
+            return tl::unexpected(
+                done.error().at(fmt::format("view '{}'", table.about().views[k].name)));
+        };
+        std::vector<ComingView> coming(table.count());
+        const auto code = [&](std::size_t k, const ReferenceView& view) -> Result<void> {
+            coming[k].view = ViewBefore::of(view);
             // What stands still, as a background does, is coded once.
-            images[k] = codedAlike(bundle.views[k], tracks_[k].before)
-                            ? imagesAgain(tracks_[k], bundle.views[k])
-                            : imagesOf(bundle.views[k], k);
-        });
+            coming[k].again = again(coming[k].view, k);
+            if (coming[k].again) {
+                STX_TRY(coming[k].images.padding, paddingOf(view.camera));
+            } else {
+                STX_TRY(coming[k].images, imagesOf(view, k));
+            }
+            return {};
+        };
+        return forEachView(
+            table, vectors ? peak::kMpeg4Vectors : peak::kMpeg4, job,
+            [&](std::size_t k, std::shared_ptr<const ReferenceView> view) {
+                return placed(code(k, *view), k);
+            },
+            [&](std::size_t k) {
+                const ComingView ready = std::move(coming[k]);
+                return placed(take(k, ready), k);
+            });
+    }
+
+    Result<void> add(const ViewTable& table, std::size_t index, Job& job) {
+        STX_CHECK(checkSameViews(first_, table.about()));
         const std::uint64_t now = ticks(frames_.timeline().times[index]);
-        for (std::size_t k = 0; k < images.size(); ++k) {
-            auto done = images[k] ? addView(tracks_[k], *images[k], bundle.views[k], now)
-                                  : Result<void>(tl::unexpected(images[k].error()));
-            if (!done)
-                return tl::unexpected(
-                    done.error().at(fmt::format("view '{}'", bundle.views[k].name)));
-            tracks_[k].before = std::move(bundle.views[k]);
-        }
-        return {};
+        return coded(
+            table, job,
+            [&](const ViewBefore& view, std::size_t k) { return view.codedAs(tracks_[k].before); },
+            [&](std::size_t k, const ComingView& coming) -> Result<void> {
+                if (!coming.again)
+                    STX_CHECK(addImages(tracks_[k], coming.images, coming.view.header, now));
+                const Camera& camera = coming.view.header.camera;
+                if (camera != tracks_[k].camera)
+                    STX_CHECK(moveCamera(tracks_[k], coming.images, camera, now));
+                tracks_[k].before = coming.view;
+                return {};
+            });
     }
 
     /// What the streams of a view get: files, or planes of what becomes video.
@@ -253,8 +357,7 @@ class SequenceWriter {
         if (!asVideo() || isWrittenAsV2(view, options_)) {
             STX_TRY(images, encodeView(view, options_, job_.limits, ranges_[k].longestSplat));
         } else {
-            STX_TRY(images.padding,
-                    centringPadding(view.camera, std::min(job_.limits.maxImageSide, 65535)));
+            STX_TRY(images.padding, paddingOf(view.camera));
         }
         if (!asVideo()) return images;
         const Node& node = *tracks_[k].node;
@@ -270,25 +373,18 @@ class SequenceWriter {
     }
     [[nodiscard]] bool asVideo() const { return options_.h264 >= 0; }
 
-    /// The images of the frame before, around a camera that may have moved.
-    Result<ViewImages> imagesAgain(const ViewTrack& track, const ReferenceView& view) const {
-        ViewImages images;
-        STX_TRY(images.padding,
-                centringPadding(view.camera, std::min(job_.limits.maxImageSide, 65535)));
-        images.texture = track.last[0];
-        images.depth = track.last[1];
-        images.normal = track.last[2];
-        images.splatU = track.last[3];
-        images.splatV = track.last[4];
-        return images;
+    [[nodiscard]] Result<Padding> paddingOf(const Camera& camera) const {
+        return centringPadding(camera, std::min(job_.limits.maxImageSide, 65535));
     }
 
-    Result<void> addView(ViewTrack& track, const ViewImages& images, const ReferenceView& view,
-                         std::uint64_t now) {
+    Result<void> addImages(ViewTrack& track, const ViewImages& images, const ViewHeader& view,
+                           std::uint64_t now) {
+        std::array<CodedImage, kRoles.size()> found;
         bool any = false;
         for (std::size_t r = 0; r < kRoles.size(); ++r) {
             if (!track.streams[r]) continue;
-            const bool differs = imageOf(images, r) != track.last[r];
+            found[r] = CodedImage::of(imageOf(images, r));
+            const bool differs = found[r] != track.last[r];
             track.changed[r] = track.changed[r] || differs;
             any = any || differs;
         }
@@ -296,29 +392,28 @@ class SequenceWriter {
             ElementaryStream* stream = track.streams[r];
             if (!stream) continue;
             if (asVideo() && r < track.video.size()) {
-                STX_CHECK(addVideo(track, images, r, view, now));
+                STX_CHECK(addVideo(track, images, r, found[r], view, now));
                 continue;
             }
             Sample sample;
             sample.time = now;
             sample.data = stream->samples.back().data;
-            if (imageOf(images, r) != track.last[r]) {
-                track.last[r] = imageOf(images, r);
-                STX_TRY(sample.data, spool_.add(track.last[r]));
+            if (found[r] != track.last[r]) {
+                track.last[r] = found[r];
+                STX_TRY(sample.data, spool_.add(imageOf(images, r)));
             }
             stream->samples.push_back(std::move(sample));
         }
-        if (view.camera == track.camera) return {};
-        return moveCamera(track, images, view, now);
+        return {};
     }
 
     /// A picture of a stream that is video from its first change on; before, it may stay an image.
     Result<void> addVideo(ViewTrack& track, const ViewImages& images, std::size_t r,
-                          const ReferenceView& view, std::uint64_t now) {
+                          const CodedImage& found, const ViewHeader& view, std::uint64_t now) {
         ElementaryStream& stream = *track.streams[r];
         const Bytes& planes = imageOf(images, r);
         int& number = track.video[r];
-        if (number < 0 && planes == track.last[r]) {
+        if (number < 0 && found == track.last[r]) {
             Sample again;
             again.time = now;
             again.data = stream.samples.back().data;
@@ -332,10 +427,12 @@ class SequenceWriter {
                     video_->begin(stream, view.camera.width + p.left + p.right,
                                   view.camera.height + p.top + p.bottom, r == 1,
                                   r == 1 ? videoDepthBits(writtenDepthBits(view, options_)) : 8));
-            for (const Sample& sample : before)
-                STX_CHECK(video_->add(number, sample.time, track.last[r]));
+            STX_TRY(track.planes[r].source, spool_.source());
+            STX_TRY(const Bytes first, track.planes[r].load(job_.limits));
+            track.planes[r] = {};
+            for (const Sample& sample : before) STX_CHECK(video_->add(number, sample.time, first));
         }
-        track.last[r] = planes;
+        track.last[r] = found;
         worstDepth_ = std::max(worstDepth_, images.worstDepth);
         coverageLost_ = coverageLost_ || images.coverageLost;
         return video_->add(number, now, planes);
@@ -370,15 +467,15 @@ class SequenceWriter {
     }
 
     /// A new node in the old one's place. It has its name, and so its id: see assignNodeIds().
-    Result<void> moveCamera(ViewTrack& track, const ViewImages& images, const ReferenceView& view,
+    Result<void> moveCamera(ViewTrack& track, const ViewImages& images, const Camera& camera,
                             std::uint64_t now) {
         const Camera& was = track.camera;
-        if (!view.camera.orthographic && (view.camera.cx != was.cx || view.camera.cy != was.cy))
+        if (!camera.orthographic && (camera.cx != was.cx || camera.cy != was.cy))
             return fail(ErrorCode::unsupported,
                         "the principal point moves from {:.6g} {:.6g} to {:.6g} {:.6g}; in MPEG-4 "
                         "it is fixed by the pictures' size; write .exr",
-                        was.cx, was.cy, view.camera.cx, view.camera.cy);
-        track.camera = view.camera;
+                        was.cx, was.cy, camera.cx, camera.cy);
+        track.camera = camera;
         NodePtr node = std::make_shared<Node>(*track.node);
         setCamera(*node, images.padding.camera);
         // Only values of the camera were set; nodes below are shared.

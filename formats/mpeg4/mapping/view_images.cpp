@@ -36,7 +36,7 @@ bool isWrittenAsV2(const ReferenceView& view, const SceneWriteOptions& options) 
     return options.nodes == SceneWriteOptions::Nodes::v2;
 }
 
-int writtenDepthBits(const ReferenceView& view, const SceneWriteOptions& options) {
+int writtenDepthBits(const ViewHeader& view, const SceneWriteOptions& options) {
     if (options.depthBits != 0) return options.depthBits;
     return view.depthBits == 8 ? 8 : 16;
 }

@@ -33,7 +33,7 @@ void setCamera(Node& node, const Camera& camera);
 /// Whether the view becomes a DepthImageV2.
 [[nodiscard]] bool isWrittenAsV2(const ReferenceView& view, const SceneWriteOptions& options);
 /// 8 or 16.
-[[nodiscard]] int writtenDepthBits(const ReferenceView& view, const SceneWriteOptions& options);
+[[nodiscard]] int writtenDepthBits(const ViewHeader& view, const SceneWriteOptions& options);
 /// The largest component of the splats' half axes; 1 where there is none.
 [[nodiscard]] float longestSplatOf(const ReferenceView& view);
 

@@ -208,7 +208,7 @@ TEST(SetViewsOnDemand, AreInMemoryWhereTheyTakeLittle) {
     const TemporaryFolder folder;
     writeRoom(folder, "");
     Job job;
-    const auto table = openSetViews(folder.path(), {}, job, heldOfSets(job.limits));
+    const auto table = openSetViews(folder.path(), {}, job, heldWhole(job.limits));
     ASSERT_TRUE(table) << table.error().text();
     EXPECT_TRUE((*table)->whole());
 }

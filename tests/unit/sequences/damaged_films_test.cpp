@@ -30,6 +30,38 @@ class DamagedViews : public MovingViews {
     ErrorCode code_;
 };
 
+/// Views that are read when they are asked for; the last of a bad frame cannot be.
+class ReadOnDemand : public ViewTable {
+  public:
+    ReadOnDemand(Bundle bundle, bool bad)
+        : ViewTable(headersOf(bundle), tableOf(bundle)->kinds()),
+          bundle_(std::move(bundle)),
+          bad_(bad) {}
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
+        job.note("a view was read");
+        if (bad_ && index + 1 == count()) return fail(ErrorCode::invalidInput, "a view is bad");
+        return std::make_shared<ReferenceView>(bundle_.views[index]);
+    }
+
+  private:
+    Bundle bundle_;
+    bool bad_;
+};
+class DamagedOnDemand : public MovingViews {
+  public:
+    DamagedOnDemand(int count, std::set<std::size_t> bad)
+        : MovingViews(count), bad_(std::move(bad)) {}
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        STX_TRY(auto bundle, frame(index, job));
+        return std::make_unique<ReadOnDemand>(std::move(bundle), bad_.contains(index));
+    }
+
+  private:
+    std::set<std::size_t> bad_;
+};
+
 /// The frame of MovingViews that is shown at each index; -1 where there is an error.
 std::vector<int> shown(Sequence& frames) {
     std::vector<int> numbers;
@@ -105,6 +137,35 @@ TEST(DamagedFilms, SayItOnceAndToTheJobAbove) {
               "frame 1 (0.04 s) cannot be used: the one before it is shown in its place, and no "
               "more is said of others like it; stx convert --strict stops there: frame 1 is bad\n");
     EXPECT_EQ(takenNotes(part).find("frame 1 was tried"), std::string::npos);
+}
+
+TEST(DamagedFilms, ViewsOnDemandAreThoseOfTheFrameBefore) {
+    constexpr std::uint64_t kRoomForOneView = 10'000;  // a frame takes 6144 bytes
+    for (const std::uint64_t limit : {kRoomForOneView, Limits().maxMemoryBytes}) {
+        const auto film =
+            acrossDamage(std::make_unique<DamagedOnDemand>(4, std::set<std::size_t>{0, 2}));
+        Job job;
+        job.limits.maxMemoryBytes = limit;
+        std::vector<int> numbers;
+        for (const std::size_t i : {0u, 1u, 2u, 3u, 2u}) {
+            const auto table = film->views(i, job);
+            ASSERT_TRUE(table) << table.error().text();
+            EXPECT_EQ((*table)->whole(), limit != kRoomForOneView);
+            EXPECT_EQ((*table)->about().time, film->timeline().times[i]);
+            for (std::size_t k = 0; k < (*table)->count(); ++k) {
+                const auto view = (*table)->view(k, job);
+                ASSERT_TRUE(view) << view.error().text();
+                if (k == 0) numbers.push_back(((*view)->texture.rgba8()->at(1, 0).r - 10) / 20);
+            }
+        }
+        EXPECT_EQ(numbers, (std::vector<int>{1, 1, 1, 3, 1}));
+        const auto notes = takenNotes(job);
+        EXPECT_NE(notes.find("frame 0 (0 s) cannot be used"), std::string::npos) << notes;
+        // What is read to find damage is not said twice.
+        EXPECT_EQ(notes.find("a view was read (10 times)") != std::string::npos,
+                  limit == kRoomForOneView)
+            << notes;
+    }
 }
 
 TEST(DamagedFilms, OtherErrorsAreErrors) {

@@ -3,6 +3,7 @@
 #include "formats/any/sequences.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/imagesets/image_sets.hpp"
+#include "lib/model/same_pictures.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
@@ -191,6 +192,46 @@ TEST(MovingSets, ADamagedPictureIsTheOneBefore) {
     const auto strict = openImageSet(set, options, job);
     ASSERT_TRUE(strict);
     EXPECT_FALSE(saveSequence(**strict, folder / "strict.mp4", {}, job));
+}
+
+TEST(MovingSets, ViewsOnDemandAreThoseOfTheFrame) {
+    TemporaryFolder folder;
+    const auto set = writeShots(folder, {{"a", 0, 0, 1},
+                                         {"b", 0, 1, 2},
+                                         {"a", 1, 0, 3},
+                                         {"b", 1, 1, 4},
+                                         {"c", 2, 1, 5},
+                                         {"a", 2, 0, 6}});
+    auto bytes = *readFile(folder / "d3.png", {});
+    bytes.resize(bytes.size() / 2);
+    writeBytes(folder / "d3.png", bytes);
+    Job job;
+    job.limits.maxMemoryBytes = 8000;  // an eighth is less than three views, of 384 bytes each
+    auto each = openImageSet(set, {}, job);
+    const auto whole = opened(set);
+    ASSERT_TRUE(each) << each.error().text();
+    ASSERT_TRUE(whole);
+    for (const std::size_t frame : {0u, 1u, 2u, 1u}) {
+        const auto table = (*each)->views(frame, job);
+        ASSERT_TRUE(table) << table.error().text();
+        EXPECT_FALSE((*table)->whole());
+        Job quiet;
+        const auto expected = whole->frame(frame, quiet);
+        ASSERT_TRUE(expected);
+        EXPECT_EQ((*table)->about().time, expected->time);
+        EXPECT_EQ((*table)->about().duration, expected->duration);
+        EXPECT_EQ((*table)->about().bounds->min, expected->bounds->min);
+        ASSERT_EQ((*table)->count(), 3u);
+        for (std::size_t k = 0; k < 3; ++k) {
+            const auto view = (*table)->view(k, job);
+            ASSERT_TRUE(view) << view.error().text();
+            EXPECT_TRUE(samePictures(**view, expected->views[k])) << frame << ' ' << k;
+            EXPECT_EQ((*view)->name, expected->views[k].name);
+            EXPECT_EQ((*view)->camera, expected->views[k].camera);
+        }
+    }
+    const auto notes = notesOf(job);
+    EXPECT_NE(notes.find("camera 'b' at 1 s cannot be used"), std::string::npos) << notes;
 }
 
 TEST(MovingSets, AFirstPictureThatIsDamagedIsNotKnown) {
