@@ -303,70 +303,56 @@ Result<int> background(const BackgroundOptions& o, const Command& command, Progr
     return backgroundOfFrames(o, program);
 }
 
-void addMaskOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
-    const char* masks = "Masks";
+void addMaskOptions(Command c, const std::shared_ptr<BackgroundOptions>& o) {
     c.option("--mask-of", o->maskOf,
              "Write what of this frame (from 0), or of all, is not background: white in a grey PNG")
-        .takes("FRAME|all")
-        .group(masks);
+        .takes("FRAME|all");
     c.option("--mask-output", o->maskOutput,
              "Names of the masks; %04d is the frame, {stem} the name of its file "
              "(default: the name of -o with _mask_%04d.png)")
-        .takes("PATTERN")
-        .group(masks);
+        .takes("PATTERN");
 }
 
 /// Of the method `select`.
-void addSelectOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
-    const char* select = "Method select";
+void addSelectOptions(Command c, const std::shared_ptr<BackgroundOptions>& o) {
     c.option("--quietest", o->settings.quietest, "Frames that are kept of each pixel (default 19)")
         .range(1, 255)
-        .takes("S")
-        .group(select);
+        .takes("S");
     c.option("--window", o->settings.windowDivisor,
              "Motion is summed over a square around the pixel: the picture's shorter side over "
              "this (default 6)")
         .range(1, 1000)
-        .takes("N")
-        .group(select);
+        .takes("N");
     c.option("--adaptive", o->settings.adaptive,
              "Keep frames with up to this many times the kept ones' mean motion, too; 0 keeps no "
              "more (default 1.15)")
         .range(0.0, 1000.0)
-        .takes("RATIO")
-        .group(select);
+        .takes("RATIO");
     c.flag("--drift", o->settings.drift,
-           "Motion is the change of gradients: light that changes slowly is none")
-        .group(select);
+           "Motion is the change of gradients: light that changes slowly is none");
 }
 
 /// Of bundles with time.
-void addFilmOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
-    const char* films = "Bundles with time";
+void addFilmOptions(Command c, const std::shared_ptr<BackgroundOptions>& o) {
     c.option("--key-views", o->temporal.keyViews,
              "Poses of cameras that move which get a background, at most; as many as see what all "
              "frames see (default 8)")
         .range(1, 64)
-        .takes("N")
-        .group(films);
+        .takes("N");
     c.option("--video", o->video,
              "h264: pictures that change as video, as stx convert does (.mp4, .xmt, .bt; default: "
              "each picture exact)")
-        .oneOf({"h264"})
-        .group(films);
-    c.option("--crf", o->crf, "Quality of --video's colour, 0 the best (default 18)")
-        .range(0, 51)
-        .group(films);
+        .oneOf({"h264"});
+    c.option("--crf", o->crf, "Quality of --video's colour, 0 the best (default 18)").range(0, 51);
 }
 
 /// Of bundles of one photograph.
-void addBehindOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
+void addBehindOptions(Command c, const std::shared_ptr<BackgroundOptions>& o) {
     c.option("--shift", o->behind.shiftPercent,
              "How far to the side an eye may go without a hole, percent of the median distance "
              "(default 8)")
         .range(0.001, kMostBehindPercent)
-        .takes("PERCENT")
-        .group("Bundles of one photograph");
+        .takes("PERCENT");
 }
 
 }  // namespace
@@ -415,10 +401,10 @@ void addBackground(CommandLine& line, Program& program) {
     c.option("--confidence", o->confidence,
              "Write how far frames agree with each pixel: 0 (none) to 255 (all)")
         .takes("FILE.png");
-    addMaskOptions(c, o);
-    addSelectOptions(c, o);
-    addFilmOptions(c, o);
-    addBehindOptions(c, o);
+    addMaskOptions(c.under("Masks"), o);
+    addSelectOptions(c.under("Method select"), o);
+    addFilmOptions(c.under("Bundles with time"), o);
+    addBehindOptions(c.under("Bundles of one photograph"), o);
     c.sharedOptions(program.common, kOutput | kPictures);
     c.runs([o, c](Program& p) { return background(*o, c, p); });
 }

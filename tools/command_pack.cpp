@@ -459,19 +459,18 @@ void addPack(CommandLine& line, Program& program) {
         .oneOf({"png", "jpeg"});
     c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100);
     refineOption(c, o->refine);
-    const char* pruning = "Pruning";
-    c.flag("--prune", o->prune, "Leave out pixels that another kept view shows as well or better")
-        .group(pruning);
-    c.option("--budget", o->budget, "Keep at most so many object pixels, as in 4M")
-        .takes("PIXELS")
-        .group(pruning);
-    c.option(
-         "--min-psnr", o->minPsnr,
-         "Prune only as far as pictures of what is kept reach this against pictures of all: RGB, "
-         "the worst of up to 12, rendered from poses of the views and half way between them")
+    Command pruning = c.under("Pruning");
+    pruning.flag("--prune", o->prune,
+                 "Leave out pixels that another kept view shows as well or better");
+    pruning.option("--budget", o->budget, "Keep at most so many object pixels, as in 4M")
+        .takes("PIXELS");
+    pruning
+        .option("--min-psnr", o->minPsnr,
+                "Prune only as far as pictures of what is kept reach this against pictures of all: "
+                "RGB, "
+                "the worst of up to 12, rendered from poses of the views and half way between them")
         .takes("DB")
-        .range(0.0, 200.0)
-        .group(pruning);
+        .range(0.0, 200.0);
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o](Program& p) { return packInput(*o, p); });
