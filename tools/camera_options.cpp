@@ -203,9 +203,7 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
                                              Program& program) {
     STX_CHECK(checkWays(o));
     std::optional<glm::ivec2> size;
-    if (!o.size.empty()) {
-        STX_TRY(size, parseSize(o.size, program.job.limits));
-    }
+    if (!o.size.empty()) STX_SET(size, parseSize(o.size, program.job.limits));
     if (context.sway) {
         STX_TRY(const auto swaying, swayCameras(context.sway->camera, context.sway->distance,
                                                 o.swayPercent / 100, swayCount(o)));

@@ -146,9 +146,8 @@ Result<int> behindOfStill(const BackgroundOptions& o, const Command& command, Se
     STX_CHECK(command.refuse({"--key-views", "--video", "--crf"},
                              fmt::format("is of films, and {} has one frame", where)));
     STX_TRY(Bundle bundle, frames.frame(0, program.job));
-    const auto added = addBehind(bundle, o.behind, program.job);
-    if (!added) return tl::unexpected(added.error().at(where));
-    program.job.note(added->note(o.behind));
+    STX_TRY(const auto added, within(where, addBehind(bundle, o.behind, program.job)));
+    program.job.note(added.note(o.behind));
     SaveOptions save;
     save.noClobber = program.common.noClobber;
     STX_CHECK(saveBundle(bundle, o.output, save, program.job));
@@ -165,11 +164,10 @@ Result<int> behindOfStill(const BackgroundOptions& o, const Command& command, Se
          {"output", o.output},
          {"method", "invented"},
          {"frames", 1},
-         {"views",
-          nlohmann::ordered_json::array({{{"name", added->name},
-                                          {"seen", added->seen},
-                                          {"hidden", added->hidden},
-                                          {"border", {added->border.x, added->border.y}}}})},
+         {"views", nlohmann::ordered_json::array({{{"name", added.name},
+                                                   {"seen", added.seen},
+                                                   {"hidden", added.hidden},
+                                                   {"border", {added.border.x, added.border.y}}}})},
          {"seconds", seconds}}));
     return 0;
 }
@@ -192,24 +190,25 @@ Result<int> backgroundOfBundle(const BackgroundOptions& o, const Command& comman
                     o.inputs[0], o.output);
     if (!frames->timeline().moves()) return behindOfStill(o, command, *frames, watch, program);
     STX_CHECK(command.refuse({"--shift"}, "is of one photograph; a film shows what is behind"));
-    auto found = rememberBackgrounds(
-        frames->timeline().times,
-        [&](std::size_t frame, Job& job) { return frames->frame(frame, job); }, o.temporal,
-        program.job);
-    if (!found) return tl::unexpected(found.error().at(fmt::format("'{}'", o.inputs[0])));
-    if (found->empty())
+    STX_TRY(auto found,
+            within(fmt::format("'{}'", o.inputs[0]),
+                   rememberBackgrounds(
+                       frames->timeline().times,
+                       [&](std::size_t frame, Job& job) { return frames->frame(frame, job); },
+                       o.temporal, program.job)));
+    if (found.empty())
         return failAt(fmt::format("'{}'", o.inputs[0]), ErrorCode::invalidInput,
                       "nothing that stays was seen by two frames or more; a background is made of "
                       "what stays");
     auto views = nlohmann::ordered_json::array();
-    for (const BackgroundModel& model : *found) {
+    for (const BackgroundModel& model : found) {
         const auto seen = model.view.pointCount();
         views.push_back(
             {{"name", model.view.name},
              {"seen", static_cast<double>(seen) / static_cast<double>(model.view.depth.count())}});
     }
     const Timeline timeline = frames->timeline();
-    frames = withBackgrounds(std::move(frames), std::move(*found));
+    frames = withBackgrounds(std::move(frames), std::move(found));
     SaveOptions save;
     save.noClobber = program.common.noClobber;
     if (!o.video.empty()) save.h264 = o.crf.value_or(18);

@@ -129,13 +129,10 @@ Result<std::unique_ptr<ViewTable>> changedAsAsked(std::unique_ptr<ViewTable> tab
                                                   const ConvertOptions& o, LargestStep& step,
                                                   Program& program) {
     const auto bits = o.mesh->depthBits;
-    if (o.refining.steps != "auto") {
-        STX_TRY(table,
+    if (o.refining.steps != "auto")
+        STX_SET(table,
                 o.refining.refined(std::move(table), imported, folderOf(target), program.job));
-    }
-    if (o.cube) {
-        STX_TRY(table, cubeOf(std::move(table), folderOf(target), program.job));
-    }
+    if (o.cube) STX_SET(table, cubeOf(std::move(table), folderOf(target), program.job));
     // Readers of image sets have said it for what they made.
     if (!bits || std::ranges::all_of(std::as_const(*table).about().views,
                                      [&](const auto& v) { return v.depthBits == *bits; }))
@@ -152,9 +149,7 @@ Result<Converted> convertStill(const std::filesystem::path& input,
     auto* mesh = std::get_if<Mesh>(&opened);
     noteUnused(input, mesh ? Reads::mesh : Reads::moment, o, program);
     std::shared_ptr<const Environment> environment;
-    if (o.environment.given()) {
-        STX_TRY(environment, environmentOf(o.environment, program.job));
-    }
+    if (o.environment.given()) STX_SET(environment, environmentOf(o.environment, program.job));
     Converted done;
     ViewTally tally;
     LargestStep step;
@@ -175,8 +170,8 @@ Result<Converted> convertStill(const std::filesystem::path& input,
         return saveViews(*table, target, options, job);
     };
     if (mesh) {
-        if (auto saved = withMeshViews(*mesh, *o.mesh, program, save); !saved)
-            return tl::unexpected(saved.error().at(fmt::format("'{}'", input.string())));
+        STX_CHECK(within(fmt::format("'{}'", input.string()),
+                         withMeshViews(*mesh, *o.mesh, program, save)));
     } else {
         STX_TRY(auto table, changedAsAsked(std::move(std::get<1>(opened)), *imported, target, o,
                                            step, program));
@@ -261,12 +256,8 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
             done = summaryOf(*passed, countPoints);
         }
     }
-    if (!done) {
-        STX_TRY(done, convertSequence(input, target, o, countPoints, program));
-    }
-    if (!done) {
-        STX_TRY(done, convertStill(input, target, o, countPoints, program));
-    }
+    if (!done) STX_SET(done, convertSequence(input, target, o, countPoints, program));
+    if (!done) STX_SET(done, convertStill(input, target, o, countPoints, program));
     const Timeline& timeline = done->timeline;
     if (!o.video.empty() && !timeline.moves())
         program.job.note("--video is of films and not used: nothing moves");
@@ -334,9 +325,8 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
         std::error_code ec;
         nlohmann::ordered_json entry = {
             {"input", o.inputs[0]}, {"output", target}, {"status", "skipped"}, {"exitCode", 0}};
-        if (!o.batch.skipExisting || !std::filesystem::exists(target, ec)) {
-            STX_TRY(entry, convertOne(o.inputs[0], target, one, program));
-        }
+        if (!o.batch.skipExisting || !std::filesystem::exists(target, ec))
+            STX_SET(entry, convertOne(o.inputs[0], target, one, program));
         if (o.batch.shard.given) {
             entry["index"] = i;
             entry["shard"] = shardJson(o.batch.shard, total);

@@ -211,8 +211,7 @@ std::optional<std::pair<int, int>> ownRate(const RenderOptions& o, const DrawnSc
 Result<void> checkCameras(const std::vector<NovelCamera>& pictures, const Limits& limits) {
     for (std::size_t i = 0; i < pictures.size(); ++i) {
         const Camera& camera = pictures[i].camera;
-        if (auto ok = camera.check(); !ok)
-            return tl::unexpected(ok.error().at(fmt::format("camera {}", i)));
+        STX_CHECK(within(fmt::format("camera {}", i), camera.check()));
         STX_CHECK(limits.checkAllocation(static_cast<std::uint64_t>(camera.width) * camera.height,
                                          64, "the picture"));
     }
@@ -248,20 +247,21 @@ Result<Drawn> drawPictures(const RenderOptions& o, DrawnScene& scene,
         const bool more = !o.skipExisting && i + 1 < part.end;
         Camera camera = pictures[i].camera;
         if (scene.moving) {
-            auto now = scene.moving->at(*pictures[i].time,
-                                        more ? pictures[i + 1].time : std::optional<double>());
-            if (!now) return tl::unexpected(now.error().at(fmt::format("picture {}", i)));
-            drawn.renderer = *now;
+            STX_TRY(auto now,
+                    within(fmt::format("picture {}", i),
+                           scene.moving->at(*pictures[i].time, more ? pictures[i + 1].time
+                                                                    : std::optional<double>())));
+            drawn.renderer = now;
             if (o.camera.view >= 0 && !(o.camera.swayPercent > 0))
                 camera = ofView(scene.moving->views(), o, camera);
         } else if (more && !o.around) {
             drawn.renderer->expect(pictures[i + 1].camera);
         }
         const Stopwatch watch;
-        auto frame = o.around ? renderAround(*drawn.renderer, camera, camera.width, camera.height,
-                                             program.job)
-                              : drawn.renderer->render(camera);
-        if (!frame) return tl::unexpected(frame.error().at(fmt::format("picture {}", i)));
+        STX_TRY(auto frame, within(fmt::format("picture {}", i),
+                                   o.around ? renderAround(*drawn.renderer, camera, camera.width,
+                                                           camera.height, program.job)
+                                            : drawn.renderer->render(camera)));
         const double milliseconds = watch.milliseconds();
         drawn.milliseconds += milliseconds;
         ++drawn.count;
@@ -270,12 +270,12 @@ Result<Drawn> drawPictures(const RenderOptions& o, DrawnScene& scene,
         if (o.shard.given) drawn.views.back()["index"] = i;
         const bool nothing =
             scene.environment
-                ? std::ranges::none_of(frame->depth.pixels(), [](float d) { return hasPoint(d); })
-                : std::ranges::all_of(frame->colour.pixels(),
+                ? std::ranges::none_of(frame.depth.pixels(), [](float d) { return hasPoint(d); })
+                : std::ranges::all_of(frame.colour.pixels(),
                                       [](glm::vec4 c) { return !(c.a > 0); });
         if (nothing) ++drawn.empty;
-        STX_CHECK(writer.write(static_cast<int>(i), *frame, camera));
-        drawn.renderer->reuse(std::move(*frame));
+        STX_CHECK(writer.write(static_cast<int>(i), frame, camera));
+        drawn.renderer->reuse(std::move(frame));
         program.job.progress(static_cast<std::int64_t>(i - part.first) + 1,
                              static_cast<std::int64_t>(part.end - part.first), "rendering");
     }
@@ -325,9 +325,7 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     o.open = o.open.into(o.fileFormat == "exr" ? "stream.exr" : o.output);
     preloadCodecs(o.input);
     STX_TRY(const auto around, environmentOf(o.environment, program.job));
-    if (around) {
-        STX_TRY(settings.environment, EnvironmentMap::make(*around, program.job.limits));
-    }
+    if (around) STX_SET(settings.environment, EnvironmentMap::make(*around, program.job.limits));
     STX_TRY(auto scene, openScene(o, settings, command, program));
     std::size_t at = 0;
     for (const std::string& light : o.lights) {

@@ -29,9 +29,7 @@ Result<ConvertSettings> settingsOf(const MeshViewOptions& o, Program& program) {
                     o.fovDeg);
     s.fovRad = glm::radians(o.fovDeg);
     s.elevationRad = glm::radians(o.elevationDeg.value_or(15.0));
-    if (!o.up.empty()) {
-        STX_TRY(s.up, parseDirection(o.up, "--up"));
-    }
+    if (!o.up.empty()) STX_SET(s.up, parseDirection(o.up, "--up"));
     s.supersampling = o.supersampling;
     s.depthBits = o.depthBits;
     s.meshNormals = o.normals == "mesh";
@@ -48,9 +46,7 @@ Result<std::vector<NamedCamera>> camerasOfFile(const MeshViewOptions& o, const M
         !std::filesystem::exists(o.views, ec))
         return cameras;
     std::optional<glm::ivec2> size;
-    if (!o.size.empty()) {
-        STX_TRY(size, parseSize(o.size, program.job.limits));
-    }
+    if (!o.size.empty()) STX_SET(size, parseSize(o.size, program.job.limits));
     STX_TRY(cameras, readCameraFile(o.views, program.job, size));
     for (NamedCamera& named : cameras) {
         named.camera = inPicture(named.camera, size);

@@ -279,9 +279,7 @@ Result<void> readImage(const fs::path& file, const AtlasHeader& header, const At
         };
         if (bits == 8) fill(std::get<0>(image.values));
         if (bits == 16) fill(std::get<1>(image.values));
-        auto depth = depthFromCodes(header.atlas, t.page, codes);
-        if (!depth) return tl::unexpected(depth.error().at(where));
-        page.depth = std::move(*depth);
+        STX_TRY(page.depth, within(where, depthFromCodes(header.atlas, t.page, codes)));
         return {};
     }
     if (material) {
@@ -327,9 +325,7 @@ Result<void> checkMemory(const AtlasHeader& header, const std::string& where,
                 : t.attribute == "splat" ? 24
                                          : 12;
     const auto pixels = static_cast<std::uint64_t>(header.pageWidth) * header.pageHeight;
-    if (auto ok = limits.checkAllocation(pixels, each, "the atlas"); !ok)
-        return tl::unexpected(ok.error().at(where));
-    return {};
+    return within(where, limits.checkAllocation(pixels, each, "the atlas"));
 }
 
 fs::path setFolderOf(const fs::path& path) {
@@ -370,7 +366,7 @@ Result<AtlasHeader> folderHeader(const fs::path& path, const Limits& limits,
 }
 
 Result<Atlas> checked(Atlas atlas, const AtlasHeader& header, const std::string& where) {
-    if (auto ok = atlas.check(); !ok) return tl::unexpected(ok.error().at(where));
+    STX_CHECK(within(where, atlas.check()));
     for (const AtlasTexture& t : header.textures) {
         // Integer codes stand for distances only; floats may be anything.
         if (t.attribute != "depth" || t.coding != "float") continue;
@@ -389,7 +385,7 @@ Result<Atlas> readFolder(const fs::path& path, Job& job) {
     atlas.pages.resize(static_cast<std::size_t>(header.pages));
     std::vector<Image<std::uint8_t>> coverage(atlas.pages.size());
     std::vector<Result<void>> done(header.textures.size());
-    parallelFor(0, static_cast<std::int64_t>(done.size()), [&](std::int64_t i) {
+    parallelFor(0, done.size(), [&](std::int64_t i) {
         const AtlasTexture& t = header.textures[i];
         auto file = resolveInside(folder, t.file, job.limits);
         done[i] =
@@ -422,9 +418,8 @@ Result<Atlas> readExr(const fs::path& path, Job& job) {
         }
         STX_CHECK(readFloats(reader, i, attributes, header.linear, atlas.pages[i]));
     }
-    if (const int at = environmentPartOf(reader); at >= 0) {
-        STX_TRY(atlas.environment, readEnvironmentPart(reader, at, job));
-    }
+    if (const int at = environmentPartOf(reader); at >= 0)
+        STX_SET(atlas.environment, readEnvironmentPart(reader, at, job));
     return checked(std::move(atlas), header, reader.where());
 }
 
@@ -519,9 +514,8 @@ Result<glm::ivec2> atlasTextureSize(const fs::path& path, const AtlasTexture& te
         return sizeOf(reader.parts()[0]);
     }
     STX_TRY(const auto bytes, readFile(file, limits));
-    const auto info = probeImage(bytes);
-    if (!info) return tl::unexpected(info.error().at(fmt::format("'{}'", file.string())));
-    return glm::ivec2(info->width, info->height);
+    STX_TRY(const auto info, within(fmt::format("'{}'", file.string()), probeImage(bytes)));
+    return glm::ivec2(info.width, info.height);
 }
 
 Result<void> readAtlasTexture(const fs::path& path, const AtlasHeader& header,

@@ -191,9 +191,8 @@ Result<bool> writeViews(const ViewTable& table, bool hasPoints, const Summarise&
     std::vector<Bounds> each(count);
     const auto keep = [&](std::size_t i,
                           std::shared_ptr<const ReferenceView> view) -> Result<void> {
-        auto points = view->checkedPointCount();
-        if (!points) return tl::unexpected(points.error().at(fmt::format("view {}", i)));
-        setPixelAttributes(parts[i], *view, *points);
+        STX_TRY(auto points, within(fmt::format("view {}", i), view->checkedPointCount()));
+        setPixelAttributes(parts[i], *view, points);
         if (summarise) parts[i].attributes["stx:summary"] = summarise(*view).text();
         if (!about.bounds) each[i] = view->computeBounds();
         views[i] = std::move(view);
@@ -350,8 +349,7 @@ Result<void> writeExrViews(const ViewTable& table, const std::filesystem::path& 
                            OutputFile::Options options, const Summarise& summarise) {
     if (table.whole()) STX_CHECK(table.about().checkHeaders());
     STX_TRY(auto file, OutputFile::create(path, options));
-    if (auto ok = writeTable(table, summarise, file, job); !ok)
-        return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
+    STX_CHECK(within(fmt::format("'{}'", path.string()), writeTable(table, summarise, file, job)));
     return file.commit();
 }
 
@@ -374,10 +372,9 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
     header.linear = isLinearExr(reader);
     for (const int i : exrViewParts(reader)) {
         const ExrPart& part = reader.parts()[i];
-        auto view = exrCamera(part);
-        if (!view) return tl::unexpected(view.error().at(reader.where()));
+        STX_TRY(auto view, within(reader.where(), exrCamera(part)));
         ExrViewHeader entry;
-        entry.view = std::move(*view);
+        entry.view = std::move(view);
         if (auto ok = entry.view.camera.check(); !ok)
             return tl::unexpected(
                 ok.error().at(fmt::format("{}: part '{}'", reader.where(), part.name)));
@@ -394,9 +391,9 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
         header.views.push_back(std::move(entry));
     }
     if (const int at = environmentPartOf(reader); at >= 0) {
-        auto environment = environmentHeader(reader.parts()[static_cast<std::size_t>(at)]);
-        if (!environment) return tl::unexpected(environment.error().at(reader.where()));
-        header.environment = std::move(*environment);
+        STX_TRY(header.environment,
+                within(reader.where(),
+                       environmentHeader(reader.parts()[static_cast<std::size_t>(at)])));
     }
     if (header.views.empty())
         return failAt(reader.where(), ErrorCode::invalidInput,
@@ -498,8 +495,7 @@ Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
     const auto parts = exrViewParts(reader);
     std::uint64_t total = 0;
     for (const int i : parts) total += exrViewBytes(reader, reader.parts()[i]);
-    if (auto ok = job.limits.checkAllocation(total, 1, "the views"); !ok)
-        return tl::unexpected(ok.error().at(reader.where()));
+    STX_CHECK(within(reader.where(), job.limits.checkAllocation(total, 1, "the views")));
 
     const auto count = static_cast<std::int64_t>(parts.size());
     std::vector<Result<void>> done(parts.size());
@@ -513,10 +509,9 @@ Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
     for (auto& result : done) {
         if (!result) return propagate(result);
     }
-    if (const int at = environmentPartOf(reader); at >= 0) {
-        STX_TRY(bundle.environment, readEnvironmentPart(reader, at, job));
-    }
-    if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(reader.where()));
+    if (const int at = environmentPartOf(reader); at >= 0)
+        STX_SET(bundle.environment, readEnvironmentPart(reader, at, job));
+    STX_CHECK(within(reader.where(), bundle.check()));
     return bundle;
 }
 

@@ -122,13 +122,13 @@ Result<Texture> readTexture(const ExrReader& reader, int index, bool linear,
         return pixels;
     };
     STX_CHECK(reader.readPart(index, place, [&](int y, int rows) {
-        parallelFor(0, rows, [&](std::int64_t i) {
-            const auto row = rowOf(y, static_cast<int>(i));
+        parallelFor(0, rows, [&](int i) {
+            const auto row = rowOf(y, i);
             channels.complete(row);
             if (linear)
                 divideByAlpha(row, row);
             else
-                divideByAlpha(row, texture.rgba8()->row(y + static_cast<int>(i)));
+                divideByAlpha(row, texture.rgba8()->row(y + i));
         });
     }));
     bleedColour(texture);

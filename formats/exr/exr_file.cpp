@@ -264,9 +264,8 @@ bool ExrReader::Impl::readZipped(int index, Rows at, const std::vector<ExrPixels
     }
     // Of a file that is damaged most chunks are not worth the work.
     std::atomic<bool> whole = true;
-    parallelFor(at.y / lines, (at.y + at.count + lines - 1) / lines, [&](std::int64_t i) {
-        if (whole && !readZippedChunk(index, static_cast<std::size_t>(i), at, pixels))
-            whole = false;
+    parallelFor(at.y / lines, (at.y + at.count + lines - 1) / lines, [&](std::size_t i) {
+        if (whole && !readZippedChunk(index, i, at, pixels)) whole = false;
     });
     return whole;
 }
@@ -332,8 +331,7 @@ Result<void> ExrReader::Impl::readHeaders(const Limits& limits) {
             return failAt(where, ErrorCode::invalidInput, "it has {} parts; 1 to {} are read",
                           file->parts(), limits.maxViews);
         for (int i = 0; i < file->parts(); ++i) {
-            if (auto ok = checkWindows(file->header(i), limits, i); !ok)
-                return tl::unexpected(ok.error().at(where));
+            STX_CHECK(within(where, checkWindows(file->header(i), limits, i)));
             parts.push_back(partFrom(file->header(i)));
         }
         chunks = exrChunksOfParts([this](std::uint64_t offset, void* to,
@@ -451,8 +449,7 @@ Result<void> ExrReader::Impl::readAllRows(int index, int rows, const Place& plac
             if (buffer.begin() != buffer.end()) {
                 zipped = zipped && readZipped(index, at, pixels);
                 if (!zipped && !checked) {
-                    if (auto ok = checkChunks(index); !ok)
-                        return tl::unexpected(ok.error().at(where));
+                    STX_CHECK(within(where, checkChunks(index)));
                     checked = true;
                 }
                 if (!zipped) {

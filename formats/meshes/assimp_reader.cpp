@@ -125,9 +125,8 @@ class SceneConverter {
         if (!mtl.alphaMap.empty() && mtl.alphaMap != mtl.diffuseMap && !files_.replacesColour())
             STX_CHECK(addAlphaMap(source, m));
         STX_CHECK(addEmission(source, mtl, scene, m));
-        if (textureOf(source, Use::normals)) {
-            STX_TRY(m.normalTexture, texture(source, Use::normals));
-        }
+        if (textureOf(source, Use::normals))
+            STX_SET(m.normalTexture, texture(source, Use::normals));
         for (const auto& [has, label] : {std::pair{source.hasBump, "bump map"},
                                          {source.hasDisplacement, "displacement map"}}) {
             if (has)

@@ -89,11 +89,10 @@ Result<std::unique_ptr<PictureSource>> openPanoramaPictures(const std::vector<fs
     Job aside;
     aside.limits = job.limits;
     std::error_code ec;
-    if (inputs.size() == 1 && fs::is_directory(inputs[0], ec)) {
-        STX_TRY(files, filesOf(numberedPictures(inputs[0], aside)));
-    } else if (inputs.size() == 1 && !fs::exists(inputs[0], ec) && isSequencePattern(inputs[0])) {
-        STX_TRY(files, filesOf(picturesOfPattern(inputs[0], aside)));
-    }
+    if (inputs.size() == 1 && fs::is_directory(inputs[0], ec))
+        STX_SET(files, filesOf(numberedPictures(inputs[0], aside)));
+    else if (inputs.size() == 1 && !fs::exists(inputs[0], ec) && isSequencePattern(inputs[0]))
+        STX_SET(files, filesOf(picturesOfPattern(inputs[0], aside)));
     for (const fs::path& file : files)
         if (fs::is_directory(file, ec))
             return fail(ErrorCode::usage,

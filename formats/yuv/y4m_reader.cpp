@@ -151,9 +151,7 @@ Result<Rgba8Image> Y4mReader::frame(int k, const Limits& limits) const {
         STX_TRY(const auto bytes, range.load(limits));
         return rgbFromYuv(bytes, format_, colour_, name, limits);
     };
-    auto image = load();
-    if (!image) return tl::unexpected(image.error().at(atByte(offset)));
-    return image;
+    return within(atByte(offset), load());
 }
 
 }  // namespace stx

@@ -48,8 +48,7 @@ Result<std::vector<std::byte>> readFrameBytes(const std::filesystem::path& path,
         return failAt(inQuotes(path.string()), ErrorCode::invalidInput,
                       "frame {} is asked for, but the file holds {} (0 to {})", frame, frames,
                       frames - 1);
-    if (auto ok = limits.checkAllocation(count, 4, "a frame"); !ok)
-        return tl::unexpected(ok.error().at(inQuotes(path.string())));
+    STX_CHECK(within(inQuotes(path.string()), limits.checkAllocation(count, 4, "a frame")));
     std::ifstream file(path, std::ios::binary);
     file.seekg(static_cast<std::streamoff>(frame * f.frameBytes()));
     std::vector<std::byte> raw(count * (f.bits > 8 ? 2 : 1));

@@ -246,29 +246,27 @@ void checkNeighbours(BackgroundModel& model, const DepthNoise& noise, float step
     };
     std::vector<std::vector<Closed>> closed(static_cast<std::size_t>(h));
     std::vector<std::vector<std::size_t>> dropped(static_cast<std::size_t>(h));
-    parallelForBlocks(0, h, 8, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y) {
-            for (int x = 0; x < w; ++x) {
-                const std::size_t pixel = static_cast<std::size_t>(y) * w + x;
-                const float here = depth.at(x, y);
-                if (hasPoint(here)) {
-                    if (!agree(here, at(x - 1, y)) && !agree(here, at(x + 1, y)) &&
-                        !agree(here, at(x, y - 1)) && !agree(here, at(x, y + 1)))
-                        dropped[static_cast<std::size_t>(y)].push_back(pixel);
-                    continue;
-                }
-                for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}}) {
-                    const float a = at(x - dx, y - dy), b = at(x + dx, y + dy);
-                    if (!agree(a, b)) continue;
-                    const std::size_t offset = static_cast<std::size_t>(dy) * w + dx;
-                    const std::size_t p = pixel - offset, q = pixel + offset;
-                    const Texture& t = model.view.texture;
-                    closed[static_cast<std::size_t>(y)].push_back(
-                        {pixel, 2 / (1 / a + 1 / b), 0.5f * (stepsOf(t, p) + stepsOf(t, q)),
-                         std::min(model.confidence.data()[p], model.confidence.data()[q]),
-                         std::min(model.lastSeen.data()[p], model.lastSeen.data()[q])});
-                    break;
-                }
+    parallelFor(0, h, 8, [&](int y) {
+        for (int x = 0; x < w; ++x) {
+            const std::size_t pixel = static_cast<std::size_t>(y) * w + x;
+            const float here = depth.at(x, y);
+            if (hasPoint(here)) {
+                if (!agree(here, at(x - 1, y)) && !agree(here, at(x + 1, y)) &&
+                    !agree(here, at(x, y - 1)) && !agree(here, at(x, y + 1)))
+                    dropped[static_cast<std::size_t>(y)].push_back(pixel);
+                continue;
+            }
+            for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}}) {
+                const float a = at(x - dx, y - dy), b = at(x + dx, y + dy);
+                if (!agree(a, b)) continue;
+                const std::size_t offset = static_cast<std::size_t>(dy) * w + dx;
+                const std::size_t p = pixel - offset, q = pixel + offset;
+                const Texture& t = model.view.texture;
+                closed[static_cast<std::size_t>(y)].push_back(
+                    {pixel, 2 / (1 / a + 1 / b), 0.5f * (stepsOf(t, p) + stepsOf(t, q)),
+                     std::min(model.confidence.data()[p], model.confidence.data()[q]),
+                     std::min(model.lastSeen.data()[p], model.lastSeen.data()[q])});
+                break;
             }
         }
     });

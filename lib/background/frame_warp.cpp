@@ -53,25 +53,21 @@ WarpFrame carveFrame(const ReferenceView& view, const Camera& camera, bool empty
         if (known.data()[i] == 0 && !(emptyIsFar && view.texture.at(i).a == 0))
             known.data()[i] = kUnknown;
     frame.nearest = Image<float>(w, h);
-    parallelForBlocks(0, h, 16, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y) {
-            const float* in = known.row(y).data();
-            float* out = across.row(y).data();
-            for (int x = 0; x < w; ++x) {
-                float most = 0;
-                for (int k = std::max(x - kClear, 0); k <= std::min(x + kClear, w - 1); ++k)
-                    most = std::max(most, in[k]);
-                out[x] = most;
-            }
+    parallelFor(0, h, 16, [&](int y) {
+        const float* in = known.row(y).data();
+        float* out = across.row(y).data();
+        for (int x = 0; x < w; ++x) {
+            float most = 0;
+            for (int k = std::max(x - kClear, 0); k <= std::min(x + kClear, w - 1); ++k)
+                most = std::max(most, in[k]);
+            out[x] = most;
         }
     });
-    parallelForBlocks(0, h, 16, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y) {
-            float* out = frame.nearest.row(y).data();
-            for (int k = std::max(y - kClear, 0); k <= std::min(y + kClear, h - 1); ++k) {
-                const float* in = across.row(k).data();
-                for (int x = 0; x < w; ++x) out[x] = std::max(out[x], in[x]);
-            }
+    parallelFor(0, h, 16, [&](int y) {
+        float* out = frame.nearest.row(y).data();
+        for (int k = std::max(y - kClear, 0); k <= std::min(y + kClear, h - 1); ++k) {
+            const float* in = across.row(k).data();
+            for (int x = 0; x < w; ++x) out[x] = std::max(out[x], in[x]);
         }
     });
     return frame;

@@ -75,13 +75,11 @@ Image<std::uint8_t> mixedPixels(const Image<float>& inverse, const DepthNoise& n
         }
     });
     Image<std::uint8_t> mixed(w, to - from, std::uint8_t{0});
-    parallelForBlocks(from, to, kRows, [&](std::int64_t begin, std::int64_t end) {
-        for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
-            std::uint8_t* out = mixed.row(y - from).data();
-            for (int k = std::max(y - kReach, top); k <= std::min(y + kReach, bottom - 1); ++k) {
-                const std::uint8_t* in = across.row(k - top).data();
-                for (int x = 0; x < w; ++x) out[x] |= in[x];
-            }
+    parallelFor(from, to, kRows, [&](int y) {
+        std::uint8_t* out = mixed.row(y - from).data();
+        for (int k = std::max(y - kReach, top); k <= std::min(y + kReach, bottom - 1); ++k) {
+            const std::uint8_t* in = across.row(k - top).data();
+            for (int x = 0; x < w; ++x) out[x] |= in[x];
         }
     });
     return mixed;

@@ -197,10 +197,9 @@ Result<void> MovingCameras::see(std::vector<KeyBackground>& keys, std::size_t fi
                 lights[i] = keys[i].measure(views[k], camera, noise);
             noise.update();
             const WarpFrame warped = warpFrame(views[k], camera, noise);
-            parallelFor(0, static_cast<std::int64_t>(keys.size()), [&](std::int64_t i) {
-                keys[static_cast<std::size_t>(i)].see(
-                    warped, lights[static_cast<std::size_t>(i)], noise, number,
-                    static_cast<float>(times_[frame] - times_[0]));
+            parallelFor(0, keys.size(), [&](std::size_t i) {
+                keys[i].see(warped, lights[i], noise, number,
+                            static_cast<float>(times_[frame] - times_[0]));
             });
             if (first > 0) continue;
             points_ += views[k].pointCount();

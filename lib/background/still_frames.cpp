@@ -48,15 +48,12 @@ Result<void> takeFrames(StillFrames& frames, std::span<const int> which, std::ui
         std::clamp<std::uint64_t>(bytes / one, 1, static_cast<std::uint64_t>(count)));
     // As many pieces as may be in memory at a time, where those are fewer than there are threads.
     const std::int64_t grain = atOnce >= threadCount() ? 1 : (count + atOnce - 1) / atOnce;
-    parallelForBlocks(0, count, grain, [&](std::int64_t begin, std::int64_t end) {
-        for (auto i = begin; i < end; ++i) {
-            const auto at = static_cast<std::size_t>(i);
-            const auto picture = frames.frame(which[at]);
-            if (picture)
-                take(at, **picture);
-            else
-                errors[at] = picture.error();
-        }
+    parallelFor(0, count, grain, [&](std::size_t at) {
+        const auto picture = frames.frame(which[at]);
+        if (picture)
+            take(at, **picture);
+        else
+            errors[at] = picture.error();
     });
     for (auto& error : errors)
         if (error) return tl::unexpected(std::move(*error));

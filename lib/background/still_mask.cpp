@@ -19,9 +19,9 @@ constexpr std::size_t kSpeckShare = 5000;
 /// The largest difference of R, G and B.
 Image<std::uint8_t> channelDifference(const Rgba8Image& a, const Rgba8Image& b) {
     Image<std::uint8_t> out(a.width(), a.height());
-    parallelFor(0, a.height(), [&](std::int64_t y) {
-        const auto p = a.row(static_cast<int>(y)), q = b.row(static_cast<int>(y));
-        const auto to = out.row(static_cast<int>(y));
+    parallelFor(0, a.height(), [&](int y) {
+        const auto p = a.row(y), q = b.row(y);
+        const auto to = out.row(y);
         for (std::size_t x = 0; x < to.size(); ++x) {
             int most = 0;
             for (int c = 0; c < 3; ++c) most = std::max(most, std::abs(p[x][c] - q[x][c]));

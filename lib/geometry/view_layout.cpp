@@ -197,12 +197,10 @@ Result<std::vector<Camera>> layoutCameras(const ViewLayout& layout, const ViewFr
     const bool tight = !isGrid(layout.kind);
     std::vector<Camera> cameras(directions.size());
     std::vector<Result<Camera>> results(directions.size(), Camera());
-    parallelFor(0, static_cast<std::int64_t>(directions.size()), [&](std::int64_t i) {
+    parallelFor(0, directions.size(), [&](std::int64_t i) {
         results[i] = frameCamera(directions[i], framing, points, sphere, tight);
     });
-    for (std::size_t i = 0; i < results.size(); ++i) {
-        STX_TRY(cameras[i], std::move(results[i]));
-    }
+    for (std::size_t i = 0; i < results.size(); ++i) STX_SET(cameras[i], std::move(results[i]));
     return cameras;
 }
 

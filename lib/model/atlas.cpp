@@ -155,8 +155,7 @@ Result<void> Atlas::check() const {
     if (padding < 0) return fail(ErrorCode::invalidInput, "the atlas' padding is {}", padding);
     STX_CHECK(checkObjects(objects, views.size()));
     for (std::size_t i = 0; i < views.size(); ++i) {
-        if (auto ok = views[i].camera.check(); !ok)
-            return tl::unexpected(ok.error().at(fmt::format("view {}", i)));
+        STX_CHECK(within(fmt::format("view {}", i), views[i].camera.check()));
     }
     for (std::size_t i = 0; i < pages.size(); ++i) {
         const auto& p = pages[i];

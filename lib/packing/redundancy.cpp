@@ -205,7 +205,7 @@ PruneView preparePruning(const ReferenceView& view) {
 }
 
 void findPartners(std::vector<PruneView>& views, const std::vector<int>& rank) {
-    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
+    parallelFor(0, views.size(), [&](std::int64_t i) {
         PruneView& p = views[i];
         for (const int j : rank) {
             // What shows now and what is remembered must not replace each other.

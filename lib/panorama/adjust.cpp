@@ -138,14 +138,14 @@ void addSide(Block& block, glm::dmat3 worldFromFrom, glm::dmat3 worldFromTo, glm
 std::vector<Block> blocksOf(const TurnModel& model, const std::vector<Pair>& pairs,
                             const AdjustSettings& s, bool derive) {
     std::vector<Block> blocks(pairs.size());
-    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
-        const Pair& pair = pairs[static_cast<std::size_t>(i)];
+    parallelFor(0, pairs.size(), [&](std::size_t i) {
+        const Pair& pair = pairs[i];
         const auto a = static_cast<std::size_t>(pair.a), b = static_cast<std::size_t>(pair.b);
         if (!model.known[a] || !model.known[b]) return;
         const glm::dmat3 ra = glm::mat3_cast(model.worldFromCamera[a]);
         const glm::dmat3 rb = glm::mat3_cast(model.worldFromCamera[b]);
         const Lenses la = lensesOf(model, pair.a), lb = lensesOf(model, pair.b);
-        Block& block = blocks[static_cast<std::size_t>(i)];
+        Block& block = blocks[i];
         for (const Match& m : pair.matches) {
             addSide(block, ra, rb, m.a, m.b, true, la, lb, s, derive);
             addSide(block, rb, ra, m.b, m.a, false, lb, la, s, derive);

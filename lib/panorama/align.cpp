@@ -178,9 +178,9 @@ Result<void> matchPatches(Series& s, const std::vector<Pair>& fromFeatures,
     std::atomic<std::int64_t> done = 0;
     PatchSettings settings;
     settings.reach = reach;
-    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
+    parallelFor(0, pairs.size(), [&](std::size_t i) {
         if (job.cancelled) return;
-        Pair& pair = pairs[static_cast<std::size_t>(i)];
+        Pair& pair = pairs[i];
         const auto a = static_cast<std::size_t>(pair.a), b = static_cast<std::size_t>(pair.b);
         pair.matches =
             alignPatches(s.copies, s.pyramids, s.features, s.model, pair.a, pair.b, settings);
@@ -344,9 +344,9 @@ Result<std::vector<int>> readPictures(PictureSource& source, Series& s, Job& job
 
     s.features.resize(s.copies.size());
     std::atomic<std::int64_t> done = 0;
-    parallelFor(0, count, [&](std::int64_t i) {
+    parallelFor(0, count, [&](std::size_t i) {
         if (job.cancelled) return;
-        const auto k = static_cast<std::size_t>(i);
+        const auto k = i;
         const std::size_t most =
             std::clamp(s.copies[k].grey.count() / kPixelsOfFeature, kFewestFeatures, kMostFeatures);
         if (twins[k] < 0) s.features[k] = findFeatures(s.copies[k], static_cast<int>(most));
@@ -476,8 +476,7 @@ Result<Start> startByFeatures(Series& s, const PanoramaSettings& settings, doubl
 Result<std::vector<Pair>> adjustByPatches(Series& s, const Start& start, bool focalGiven,
                                           Job& job) {
     s.pyramids.resize(s.copies.size());
-    parallelFor(0, static_cast<std::int64_t>(s.copies.size()), [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
+    parallelFor(0, s.copies.size(), [&](std::size_t k) {
         if (s.model.known[k]) s.pyramids[k] = pyramidOf(s.copies[k].grey);
     });
     std::vector<Pair> all;

@@ -344,9 +344,9 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
                  width, top, sums);
         }
         const Srgb8Tables& tables = srgb8Tables();
-        parallelFor(0, sums.height(), [&](std::int64_t y) {
-            const auto fromRow = sums.row(static_cast<int>(y));
-            const auto toRow = out.pixels.row(top + static_cast<int>(y));
+        parallelFor(0, sums.height(), [&](int y) {
+            const auto fromRow = sums.row(y);
+            const auto toRow = out.pixels.row(top + y);
             for (std::size_t x = 0; x < toRow.size(); ++x) {
                 const glm::vec4 s = fromRow[x];
                 if (s.a <= kLeastCoverage) continue;

@@ -165,9 +165,9 @@ Result<std::vector<Footprint>> footprintsOf(PictureSource& source,
     std::vector<Result<void>> made(used.size());
     std::atomic<std::int64_t> done = 0;
     const auto count = static_cast<std::int64_t>(used.size());
-    parallelFor(0, count, [&](std::int64_t i) {
+    parallelFor(0, count, [&](std::size_t i) {
         if (job.cancelled) return;
-        const auto at = static_cast<std::size_t>(i);
+        const auto at = i;
         auto picture = source.picture(used[at]);
         if (!picture) {
             made[at] = propagate(picture);

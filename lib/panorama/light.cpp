@@ -155,8 +155,7 @@ std::vector<glm::dvec3> findGains(const std::vector<Footprint>& prints, int grid
         double weight;
     };
     std::vector<std::vector<Ratio>> rows(n);
-    parallelFor(0, static_cast<std::int64_t>(n), [&](std::int64_t i) {
-        const auto a = static_cast<std::size_t>(i);
+    parallelFor(0, n, [&](std::size_t a) {
         for (std::size_t b = a + 1; b < n; ++b) {
             if (!boxesMeet(prints[a], prints[b], gridWidth)) continue;
             std::array<std::vector<float>, 3> logs;
@@ -207,8 +206,7 @@ std::vector<Image<glm::vec3>> findCorrections(const std::vector<Footprint>& prin
     const int gridWidth = labels.width();
     std::vector<Image<glm::vec3>> logs(n), out(n);
     std::vector<Image<float>> weights(n);
-    parallelFor(0, static_cast<std::int64_t>(n), [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
+    parallelFor(0, n, [&](std::size_t k) {
         logs[k] = logsOf(prints[k], gains[k]);
         weights[k] = weightsOf(prints[k], static_cast<int>(k), labels);
     });
@@ -216,8 +214,7 @@ std::vector<Image<glm::vec3>> findCorrections(const std::vector<Footprint>& prin
     // picture weighs more the nearer the place is to the part of it that is shown. Differences
     // are smoothed before they are weighed, so that all pictures come to the same light and no
     // step is seen where one of them ends.
-    parallelFor(0, static_cast<std::int64_t>(n), [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
+    parallelFor(0, n, [&](std::size_t k) {
         const Footprint& f = prints[k];
         Image<glm::vec4> sums(f.box.width, f.box.height);
         for (std::size_t p = 0; p < sums.count(); ++p)

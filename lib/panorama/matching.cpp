@@ -231,9 +231,9 @@ Result<PairSearch> searchPairs(const std::vector<WorkCopy>& copies,
     std::vector<std::vector<Match>> matches(all.size());
     std::vector<std::vector<Pair>> found(all.size());
     std::atomic<std::int64_t> done = 0;
-    parallelFor(0, static_cast<std::int64_t>(all.size()), [&](std::int64_t i) {
+    parallelFor(0, all.size(), [&](std::size_t i) {
         if (job.cancelled) return;
-        const auto k = static_cast<std::size_t>(i);
+        const auto k = i;
         const auto a = static_cast<std::size_t>(all[k].first);
         const auto b = static_cast<std::size_t>(all[k].second);
         matches[k] = matchFeatures(copies[a], features[a], copies[b], features[b]);

@@ -32,9 +32,9 @@ glm::dvec3 anyAcross(glm::dvec3 direction) {
 /// The relative turn that the matches of a pair say, to its second picture from its first.
 std::vector<glm::dquat> turnsOf(const std::vector<Pair>& pairs, const TurnLens& lens) {
     std::vector<glm::dquat> turns(pairs.size());
-    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
-        const Pair& pair = pairs[static_cast<std::size_t>(i)];
-        turns[static_cast<std::size_t>(i)] = turnOf(pair.matches, lens, pair.bFromA);
+    parallelFor(0, pairs.size(), [&](std::size_t i) {
+        const Pair& pair = pairs[i];
+        turns[i] = turnOf(pair.matches, lens, pair.bFromA);
     });
     return turns;
 }

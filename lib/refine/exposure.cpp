@@ -309,8 +309,7 @@ Result<std::optional<std::vector<ColourMap>>> mapsOf(std::span<const Camera> cam
 
 std::vector<ColourMap> exposureMaps(std::span<const Camera> cameras, const PartOfView& partOf) {
     const auto each = [&](const std::function<void(std::size_t)>& body) -> Result<bool> {
-        parallelFor(0, static_cast<std::int64_t>(cameras.size()),
-                    [&](std::int64_t v) { body(static_cast<std::size_t>(v)); });
+        parallelFor(0, cameras.size(), [&](std::size_t v) { body(v); });
         return true;
     };
     return **mapsOf(cameras, partOf, each, false, nullptr);  // nothing in it fails or ends

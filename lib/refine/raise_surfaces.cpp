@@ -79,8 +79,7 @@ float CoarseDepth::clampedAt(int x, int y) const {
 void CoarseDepth::findMixed() {
     static constexpr int kWays[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
     mixed_ = Image<std::uint8_t>(width(), height(), 0);
-    parallelFor(0, height(), [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(0, height(), [&](int y) {
         for (int x = 0; x < width(); ++x) {
             const float own = inverse_.at(x, y);
             if (own <= 0) continue;
@@ -103,8 +102,7 @@ void CoarseDepth::gatherColours(const Texture& picture) {
     const auto firstPixel = [](int sample, int pixels, int samples) {
         return static_cast<int>(static_cast<std::int64_t>(sample) * pixels / samples);
     };
-    parallelFor(0, height(), [&](std::int64_t row) {
-        const int cy = static_cast<int>(row);
+    parallelFor(0, height(), [&](int cy) {
         const int top = firstPixel(cy, picture.height(), height()),
                   bottom = std::max(top + 1, firstPixel(cy + 1, picture.height(), height()));
         for (int cx = 0; cx < width(); ++cx) {

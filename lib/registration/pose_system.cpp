@@ -48,8 +48,7 @@ Matrix6 priorOf(const Matrix6& told) {
 
 Bounds boundsOf(const std::vector<PoseSample>& views) {
     std::vector<Bounds> each(views.size());
-    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
+    parallelFor(0, views.size(), [&](std::size_t at) {
         each[at] = boundsOfPoints(views[at].depth, views[at].header.camera);
     });
     return boundsTogether(each);

@@ -178,8 +178,7 @@ Result<Bins> binned(const std::vector<Projected>& seen, const std::vector<std::u
         }
     };
     const auto forPieces = [&](const auto& body) {
-        parallelFor(0, static_cast<std::int64_t>(pieces),
-                    [&](std::int64_t p) { body(static_cast<std::size_t>(p)); });
+        parallelFor(0, pieces, [&](std::size_t p) { body(p); });
     };
     forPieces([&](std::size_t piece) {
         forPiece(piece, [&](std::uint32_t, std::size_t tile) { ++counts[piece * tiles + tile]; });

@@ -201,9 +201,7 @@ Result<ProtoPtr> BifsNodeReader::readProto(int depth) {
     const auto declared = std::make_shared<Proto>();
     STX_CHECK(useBudget(sizeof(Proto)));
     declared->id = in.read(config.protoIdBits);
-    if (useNames) {
-        STX_TRY(declared->name, readName());
-    }
+    if (useNames) STX_SET(declared->name, readName());
     // Texts need names; these are those of another implementation.
     if (!isFieldName(declared->name)) declared->name = fmt::format("Proto{}", declared->id);
     Proto* const outer = std::exchange(proto, declared.get());
@@ -231,9 +229,7 @@ Result<void> BifsNodeReader::readInterface(Proto& declared, int depth) {
         FieldInfo field;
         field.kind = static_cast<FieldKind>(in.read(2));
         const int code = static_cast<int>(in.read(6));
-        if (useNames) {
-            STX_TRY(field.name, readName());
-        }
+        if (useNames) STX_SET(field.name, readName());
         STX_CHECK(check("the interface of a PROTO"));
         STX_CHECK(useBudget(sizeof(FieldInfo) + sizeof(FieldValue)));
         const bool taken = std::any_of(fields.begin(), fields.end(), [&](const FieldInfo& other) {
@@ -249,9 +245,8 @@ Result<void> BifsNodeReader::readInterface(Proto& declared, int depth) {
         field.type = *type;
         if (itemType(*type) == FieldType::SFNode) field.nodeType = Ndt::SFWorldNode;
         FieldValue value = emptyValue(field.type);
-        if (field.kind == FieldKind::field || field.kind == FieldKind::exposedField) {
-            STX_TRY(value, readField(declared.type, field, depth));
-        }
+        if (field.kind == FieldKind::field || field.kind == FieldKind::exposedField)
+            STX_SET(value, readField(declared.type, field, depth));
         defaults->values.push_back(std::move(value));
         fields.push_back(std::move(field));
     }

@@ -313,8 +313,7 @@ Result<void> BifsNodeWriter::writeProtos(const std::vector<ProtoPtr>& protos, in
     if (depth > maxNesting) return error("PROTOs are nested more than {} deep", maxNesting);
     for (const ProtoPtr& declared : protos) {
         out.flag(true);
-        auto done = writeProto(*declared, depth);
-        if (!done) return tl::unexpected(done.error().at(fmt::format("PROTO {}", declared->name)));
+        STX_CHECK(within(fmt::format("PROTO {}", declared->name), writeProto(*declared, depth)));
     }
     out.flag(false);
     return {};

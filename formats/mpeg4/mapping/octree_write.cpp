@@ -312,8 +312,7 @@ Result<OctreeParts> octreeFromBundle(const Bundle& bundle, int levels, Job& job)
     STX_TRY(const auto octree, Octree::parse(parts.octree, parts.resolution, job.limits));
     parts.pictures.resize(bundle.views.size());
     std::vector<Result<void>> done(bundle.views.size());
-    parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
+    parallelFor(0, bundle.views.size(), [&](std::size_t at) {
         const ReferenceView& view = bundle.views[at];
         OctreeParts::Picture& picture = parts.pictures[at];
         picture.name = view.name;

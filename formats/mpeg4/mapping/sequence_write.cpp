@@ -228,8 +228,7 @@ class SequenceWriter {
     Result<void> add(Bundle& bundle, std::size_t index) {
         STX_CHECK(checkSameViews(first_, bundle));
         std::vector<Result<ViewImages>> images(bundle.views.size());
-        parallelFor(0, static_cast<std::int64_t>(images.size()), [&](std::int64_t i) {
-            const auto k = static_cast<std::size_t>(i);
+        parallelFor(0, images.size(), [&](std::size_t k) {
             // What stands still, as a background does, is coded once.
             images[k] = codedAlike(bundle.views[k], tracks_[k].before)
                             ? imagesAgain(tracks_[k], bundle.views[k])

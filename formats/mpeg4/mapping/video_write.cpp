@@ -182,9 +182,7 @@ Bytes withLengths(ByteSpan byteStream) {
 
 Result<int> VideoStreams::begin(ElementaryStream& stream, int width, int height, bool grey,
                                 int bits) {
-    if (!process_) {
-        STX_TRY(process_, VideoProcess::start(limits_));
-    }
+    if (!process_) STX_SET(process_, VideoProcess::start(limits_));
     video::EncoderRequest request;
     request.width = width;
     request.height = height;

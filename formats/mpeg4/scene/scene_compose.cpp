@@ -29,8 +29,8 @@ class Composer {
         copyAll(commands);
         for (Command& command : commands) {
             ++count_;
-            auto done = std::visit([&](auto& c) { return apply(c); }, command);
-            if (!done) return tl::unexpected(done.error().at(fmt::format("command {}", count_)));
+            STX_CHECK(within(fmt::format("command {}", count_),
+                             std::visit([&](auto& c) { return apply(c); }, command)));
         }
         return {};
     }

@@ -139,9 +139,9 @@ float Silhouettes::alphaBilinear(const View& view, double x, double y) const {
 
 Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
     std::vector<View> all(set_.views().size());
-    parallelFor(0, static_cast<std::int64_t>(all.size()), [&](std::int64_t n) {
+    parallelFor(0, all.size(), [&](std::size_t n) {
         set_.settle();
-        const auto number = static_cast<std::size_t>(n);
+        const auto number = n;
         if (set_.views()[number].unread) return;
         const Camera& camera = set_.views()[number].camera;
         const int w = camera.width, h = camera.height;
@@ -249,8 +249,8 @@ void Silhouettes::carve(Frame& frame, const Camera& camera, const Extent& drawn)
                                        static_cast<std::size_t>(across));
     };
     const auto inRows = [&](const auto& call) {
-        parallelFor(0, tasks, [&](std::int64_t task) {
-            const int from = part.y0 + static_cast<int>(task) * kRowsPerTask;
+        parallelFor(0, tasks, [&](int task) {
+            const int from = part.y0 + task * kRowsPerTask;
             call(from, std::min(part.y1, from + kRowsPerTask));
         });
     };

@@ -149,10 +149,8 @@ Result<PageSet> PageSet::of(const Atlas& atlas, Job& job) {
     PageSet set(data);
     if (atlas.keptPixels < atlas.sourcePixels) {
         std::vector<std::vector<std::uint64_t>> bits(data->views.size());
-        parallelFor(0, static_cast<std::int64_t>(bits.size()), [&](std::int64_t i) {
-            const auto view = static_cast<std::size_t>(i);
-            bits[view] = outsideBits(atlas, view);
-        });
+        parallelFor(0, bits.size(),
+                    [&](std::size_t view) { bits[view] = outsideBits(atlas, view); });
         for (std::size_t i = 0; i < bits.size(); ++i) data->index[i].outside = std::move(bits[i]);
     }
     STX_CHECK(job.checkCancelled());

@@ -51,8 +51,7 @@ bool PageSet::mayRefine(const RefineSettings& settings) const {
     };
     // Views in rectangles are copied; one at a time, since a copy takes the memory of a whole view.
     if (views().front().whole)
-        parallelFor(0, static_cast<std::int64_t>(ofViews.size()),
-                    [&](std::int64_t i) { look(static_cast<std::size_t>(i)); });
+        parallelFor(0, ofViews.size(), [&](std::size_t i) { look(i); });
     else
         for (std::size_t i = 0; i < ofViews.size(); ++i) look(i);
     RefineNeeds needs(left);
@@ -73,8 +72,7 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report,
     if (!whole && !mayRefine(left)) return *this;
     std::vector<ReferenceView> copies(views().size());
     std::vector<RefineView> given(views().size());
-    parallelFor(0, static_cast<std::int64_t>(given.size()), [&](std::int64_t i) {
-        const auto number = static_cast<std::size_t>(i);
+    parallelFor(0, given.size(), [&](std::size_t number) {
         given[number] = viewImages(*this, number, copies[number]);
     });
     auto better = refineDepth(given, left, found, {spool(), atOnce});

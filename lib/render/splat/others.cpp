@@ -209,7 +209,7 @@ void findOthers(const PageSet& set, PreparedPages& prepared) {
                 }
             }
         };
-        parallelForBlocks(0, static_cast<std::int64_t>(rectangle.blocks.size()), 32, find);
+        parallelForBlocks(0, rectangle.blocks.size(), 32, find);
     }
 }
 

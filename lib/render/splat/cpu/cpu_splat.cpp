@@ -139,16 +139,12 @@ void CpuSplatRenderer::planFrame(const Camera& camera) {
     std::size_t first = 0;
     for (std::size_t k = 0; k < prepared_.rectangles.size(); ++k) {
         const auto& info = prepared_.rectangles[k];
-        parallelForBlocks(0, static_cast<std::int64_t>(info.blocks.size()), 512,
-                          [&](std::int64_t from, std::int64_t to) {
-                              for (auto i = from; i < to; ++i) {
-                                  BlockTask& task = tasks_[first + i];
-                                  task.source = static_cast<std::uint32_t>(k);
-                                  seen_[first + i] =
-                                      planBlock(info, info.blocks[i], sources_[k], camera,
-                                                settings_.splat == SplatRule::data, task);
-                              }
-                          });
+        parallelFor(0, info.blocks.size(), 512, [&](std::int64_t i) {
+            BlockTask& task = tasks_[first + i];
+            task.source = static_cast<std::uint32_t>(k);
+            seen_[first + i] = planBlock(info, info.blocks[i], sources_[k], camera,
+                                         settings_.splat == SplatRule::data, task);
+        });
         first += info.blocks.size();
     }
 }
@@ -222,8 +218,8 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     }
     {
         const StageTimer timer(settings_.log.get(), "draw");
-        parallelFor(0, regions, [&](std::int64_t n) {
-            drawRegion(picture, static_cast<int>(n));
+        parallelFor(0, regions, [&](int n) {
+            drawRegion(picture, n);
             set_.settle();
         });
     }

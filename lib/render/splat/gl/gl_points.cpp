@@ -12,8 +12,7 @@ Image<glm::vec3> normalsOf(const ReferenceView& view) {
     const Camera& camera = view.camera;
     const DepthSurface surface = depthSurface(view, BakeSettings{});
     Image<glm::vec3> out(camera.width, camera.height, glm::vec3(0));
-    parallelFor(0, camera.height, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(0, camera.height, [&](int y) {
         for (int x = 0; x < camera.width; ++x) {
             if (!hasPoint(view.depth.at(x, y))) continue;
             out.at(x, y) =
