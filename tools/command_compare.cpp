@@ -204,7 +204,7 @@ Result<ManyScores> compareMany(const CompareOptions& o, bool folders,
             program.print(printable(pair.name) + ": " + scoresOf(c, "") + "\n");
     }
     many.total.plain = sequence.total();
-    many.worst = pairs[static_cast<std::size_t>(sequence.worstFrame())];
+    many.worst = pairs[sequence.worstFrame()];
     return many;
 }
 

@@ -152,8 +152,7 @@ Result<void> checkFrames(const RenderOptions& o, int count, Program& program) {
 
 /// The camera of a reference view, which may move, in a picture as large as `picture`.
 Camera ofView(const std::vector<Camera>& views, const RenderOptions& o, const Camera& picture) {
-    return inPicture(views[static_cast<std::size_t>(o.camera.view)],
-                     glm::ivec2(picture.width, picture.height));
+    return inPicture(views[o.camera.view], glm::ivec2(picture.width, picture.height));
 }
 
 /// The options of pictures all around: what a lens would say is refused.

@@ -93,7 +93,7 @@ Result<Selection> selectInFront(const Bundle& bundle, const SelectSettings& sett
         (bundle.views[i].background ? behind : numbers).push_back(static_cast<int>(i));
     if (behind.empty() || numbers.empty()) return selectViews(bundle, settings, job);
     STX_TRY(auto selection, selectViews(keepViews(bundle, numbers), settings, job));
-    for (int& view : selection.views) view = numbers[static_cast<std::size_t>(view)];
+    for (int& view : selection.views) view = numbers[view];
     selection.views.insert(selection.views.end(), behind.begin(), behind.end());
     return selection;
 }

@@ -165,8 +165,7 @@ Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
     STX_TRY(const auto reader, ExrReader::open(path, job.limits));
     const int at = environmentPartOf(reader);
     if (at >= 0 && exrViewParts(reader).empty()) {
-        STX_TRY(auto e, within(reader.where(),
-                               environmentHeader(reader.parts()[static_cast<std::size_t>(at)])));
+        STX_TRY(auto e, within(reader.where(), environmentHeader(reader.parts()[at])));
         out["container"] = "exr";
         out["views"] = Json::array();
         out["environment"] = environmentJson(e.environment, e.size, e.faces);
@@ -347,7 +346,7 @@ Result<void> describeAtlas(const fs::path& path, const std::string& object, Json
                                     header.environmentFile, job.limits));
     STX_TRY(const auto reader, ExrReader::open(file, job.limits));
     if (const int at = environmentPartOf(reader); at >= 0) {
-        STX_TRY(const auto e, environmentHeader(reader.parts()[static_cast<std::size_t>(at)]));
+        STX_TRY(const auto e, environmentHeader(reader.parts()[at]));
         out["environment"] = environmentJson(e.environment, e.size, e.faces);
     }
     return {};

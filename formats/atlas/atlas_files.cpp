@@ -9,7 +9,7 @@
 #include "formats/exr/environment_exr.hpp"
 #include "formats/exr/exr_colour.hpp"
 #include "formats/images/images.hpp"
-#include "lib/base/parallel.hpp"
+#include "lib/base/parallel_try.hpp"
 
 namespace stx {
 
@@ -164,21 +164,13 @@ Result<void> writeFolder(const Atlas& atlas, const fs::path& path, Job& job,
     const AtlasHeader header = headerOf(atlas, false, options.jpegQuality > 0);
     if (options.jpegQuality > 0) STX_CHECK(checkJpeg(header, path));
     STX_TRY(auto folder, OutputFolder::create(path, options.output, ownNames()));
-    const auto count = static_cast<std::int64_t>(header.textures.size());
-    std::vector<Result<void>> done(header.textures.size());
-    parallelFor(0, count, [&](std::int64_t i) {
+    STX_CHECK(parallelTry(0, header.textures.size(), [&](std::size_t i) -> Result<void> {
         const AtlasTexture& t = header.textures[i];
         const fs::path file = folder.temporaryPath() / t.file;
-        if (t.coding == "float") {
-            done[i] = writeFloatImage(header, atlas.pages[t.page], t, file);
-            return;
-        }
-        const auto bytes = encodeImage(atlas, t, options.jpegQuality, depthIsCoded, job);
-        done[i] = bytes ? writeFile(file, *bytes) : Result<void>(tl::unexpected(bytes.error()));
-    });
-    for (auto& result : done) {
-        if (!result) return propagate(result);
-    }
+        if (t.coding == "float") return writeFloatImage(header, atlas.pages[t.page], t, file);
+        STX_TRY(const auto bytes, encodeImage(atlas, t, options.jpegQuality, depthIsCoded, job));
+        return writeFile(file, bytes);
+    }));
     if (atlas.environment)
         STX_CHECK(writeEnvironmentExr(*atlas.environment, folder.temporaryPath() / kEnvironmentFile,
                                       job));
@@ -384,17 +376,11 @@ Result<Atlas> readFolder(const fs::path& path, Job& job) {
     Atlas atlas = header.atlas;
     atlas.pages.resize(static_cast<std::size_t>(header.pages));
     std::vector<Image<std::uint8_t>> coverage(atlas.pages.size());
-    std::vector<Result<void>> done(header.textures.size());
-    parallelFor(0, done.size(), [&](std::int64_t i) {
+    STX_CHECK(parallelTry(0, header.textures.size(), [&](std::size_t i) -> Result<void> {
         const AtlasTexture& t = header.textures[i];
-        auto file = resolveInside(folder, t.file, job.limits);
-        done[i] =
-            file ? readImage(*file, header, t, atlas.pages[t.page], coverage[t.page], job.limits)
-                 : Result<void>(tl::unexpected(file.error().at(where)));
-    });
-    for (auto& result : done) {
-        if (!result) return propagate(result);
-    }
+        STX_TRY(const auto file, within(where, resolveInside(folder, t.file, job.limits)));
+        return readImage(file, header, t, atlas.pages[t.page], coverage[t.page], job.limits);
+    }));
     for (std::size_t i = 0; i < coverage.size(); ++i) {
         if (!coverage[i].empty()) setAlpha(*atlas.pages[i].texture.rgba8(), coverage[i]);
     }
@@ -465,8 +451,7 @@ Result<void> writeAtlas(const Atlas& atlas, const fs::path& path, Job& job,
 Result<void> writeAtlas(Atlas&& atlas, const fs::path& path, Job& job,
                         const AtlasSaveOptions& options) {
     Atlas own = std::move(atlas);
-    return writeAny(own, path, job, options,
-                    [&own](int page) { own.pages[static_cast<std::size_t>(page)].depth = {}; });
+    return writeAny(own, path, job, options, [&own](int page) { own.pages[page].depth = {}; });
 }
 
 int largestImageSide(const Atlas& atlas, const fs::path& path, const AtlasSaveOptions& options) {

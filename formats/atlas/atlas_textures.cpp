@@ -42,7 +42,7 @@ DepthCodes depthCodes(const Atlas& atlas, int page) {
         for (int x = 0, y = row; x < depth.width(); ++x) {
             const float d = depth.at(x, y);
             if (!hasPoint(d)) continue;
-            const int view = owner[static_cast<std::size_t>(x)];
+            const int view = owner[x];
             if (view < 0) {
                 ++lost;
                 continue;
@@ -68,7 +68,7 @@ Result<Image<float>> depthFromCodes(const Atlas& atlas, int page,
         const auto owner = ownersOfRow(atlas, page, row, codes.width());
         for (int x = 0, y = row; x < codes.width(); ++x) {
             const std::uint32_t d = codes.at(x, y);
-            const int view = owner[static_cast<std::size_t>(x)];
+            const int view = owner[x];
             if (d == 0 || view < 0) continue;
             const DepthCode code = atlas.views[view].depthCode();
             if (d > code.dmax) tooLarge = true;

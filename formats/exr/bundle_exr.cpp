@@ -7,7 +7,7 @@
 
 #include "formats/exr/environment_exr.hpp"
 #include "formats/exr/exr_colour.hpp"
-#include "lib/base/parallel.hpp"
+#include "lib/base/parallel_try.hpp"
 
 // Our attributes, all exact.
 //   each part: stx:position (v3d) · stx:orientation (text: axis x y z, angle in radians) ·
@@ -391,9 +391,7 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
         header.views.push_back(std::move(entry));
     }
     if (const int at = environmentPartOf(reader); at >= 0) {
-        STX_TRY(header.environment,
-                within(reader.where(),
-                       environmentHeader(reader.parts()[static_cast<std::size_t>(at)])));
+        STX_TRY(header.environment, within(reader.where(), environmentHeader(reader.parts()[at])));
     }
     if (header.views.empty())
         return failAt(reader.where(), ErrorCode::invalidInput,
@@ -443,8 +441,7 @@ class ExrViews : public ViewTable {
     Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job&) const override {
         auto view = std::make_shared<ReferenceView>(about().views[index]);
         const int part = parts_[index];
-        STX_CHECK(
-            readExrView(reader_, part, reader_.parts()[static_cast<std::size_t>(part)], *view));
+        STX_CHECK(readExrView(reader_, part, reader_.parts()[part], *view));
         if (auto ok = view->check(); !ok)
             return tl::unexpected(
                 ok.error().at(fmt::format("{}: view {}", reader_.where(), index)));
@@ -473,7 +470,7 @@ Result<std::unique_ptr<ViewTable>> openExrViews(const std::filesystem::path& pat
     STX_TRY(auto header, readExrBundleHeader(reader));
     std::vector<ViewImageKinds> kinds;
     for (const int i : exrViewParts(reader)) {
-        const ExrPart& part = reader.parts()[static_cast<std::size_t>(i)];
+        const ExrPart& part = reader.parts()[i];
         if (!isOurView(part)) return std::unique_ptr<ViewTable>();
         kinds.push_back(kindsOf(part, header.linear));
     }
@@ -498,17 +495,14 @@ Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
     STX_CHECK(within(reader.where(), job.limits.checkAllocation(total, 1, "the views")));
 
     const auto count = static_cast<std::int64_t>(parts.size());
-    std::vector<Result<void>> done(parts.size());
     std::atomic<std::int64_t> finished = 0;
-    parallelFor(0, count, [&](std::int64_t i) {
-        done[i] = job.checkCancelled();
-        if (!done[i]) return;
-        done[i] = readExrView(reader, parts[i], reader.parts()[parts[i]], bundle.views[i]);
+    const auto read = parallelTry(0, count, [&](std::int64_t i) -> Result<void> {
+        STX_CHECK(job.checkCancelled());
+        STX_CHECK(readExrView(reader, parts[i], reader.parts()[parts[i]], bundle.views[i]));
         job.progress(++finished, count, "reading views");
+        return {};
     });
-    for (auto& result : done) {
-        if (!result) return propagate(result);
-    }
+    STX_CHECK(read);
     if (const int at = environmentPartOf(reader); at >= 0)
         STX_SET(bundle.environment, readEnvironmentPart(reader, at, job));
     STX_CHECK(within(reader.where(), bundle.check()));

@@ -122,7 +122,7 @@ Result<ExrEnvironmentHeader> environmentHeader(const ExrPart& part) {
 
 Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& reader, int index,
                                                                Job& job) {
-    const ExrPart& part = reader.parts()[static_cast<std::size_t>(index)];
+    const ExrPart& part = reader.parts()[index];
     STX_TRY(auto header, within(reader.where(), environmentHeader(part)));
     auto environment = std::make_shared<Environment>(std::move(header.environment));
     const auto count = static_cast<std::uint64_t>(part.width) * part.height;
@@ -282,7 +282,7 @@ Result<std::shared_ptr<const Environment>> readEnvironmentExr(const std::filesys
                       "it has no environment: no part with the attribute envmap, and its first "
                       "picture of {}x{} is not twice as wide as high",
                       first.width, first.height);
-    if (!reader.parts()[static_cast<std::size_t>(at)].linearPrimaries)
+    if (!reader.parts()[at].linearPrimaries)
         job.note(reader.where() +
                  ": its primaries are not Rec. 709; colours are taken as if they were");
     return readEnvironmentPart(reader, at, job);

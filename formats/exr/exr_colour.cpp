@@ -102,7 +102,7 @@ Texture textureFromPremultiplied(const Image<glm::vec4>& premultiplied) {
 
 Result<Texture> readTexture(const ExrReader& reader, int index, bool linear,
                             const std::vector<ExrPixels>& others) {
-    const ExrPart& part = reader.parts()[static_cast<std::size_t>(index)];
+    const ExrPart& part = reader.parts()[index];
     const ColourChannels channels(part);
     Texture texture = linear ? Texture(RgbaFloatImage(part.width, part.height))
                              : Texture(Rgba8Image(part.width, part.height));

@@ -35,11 +35,9 @@ class PictureFiles final : public PictureSource {
         return {};
     }
     [[nodiscard]] int count() const override { return static_cast<int>(files_.size()); }
-    [[nodiscard]] std::string name(int k) const override {
-        return files_[static_cast<std::size_t>(k)].filename().string();
-    }
+    [[nodiscard]] std::string name(int k) const override { return files_[k].filename().string(); }
     [[nodiscard]] double focalHint(int k) const override {
-        return notes_[static_cast<std::size_t>(k)].focal35 / kHalfDiagonal35;
+        return notes_[k].focal35 / kHalfDiagonal35;
     }
     [[nodiscard]] Result<Rgba8Image> picture(int k) override {
         const auto at = static_cast<std::size_t>(k);

@@ -216,10 +216,9 @@ int Film::firstVideo() const {
 }
 
 Result<void> Film::select(int track) {
-    if (track < 0 || track >= static_cast<int>(tracks_.size()) ||
-        !tracks_[static_cast<std::size_t>(track)].video)
+    if (track < 0 || track >= static_cast<int>(tracks_.size()) || !tracks_[track].video)
         return failAt(where(), ErrorCode::invalidInput, "it has no track of video");
-    const Track& chosenTrack = tracks_[static_cast<std::size_t>(track)];
+    const Track& chosenTrack = tracks_[track];
     if (chosenTrack.width < 1 || chosenTrack.height < 1 ||
         chosenTrack.width > limits_.maxImageSide || chosenTrack.height > limits_.maxImageSide)
         return failAt(where(), ErrorCode::invalidInput,

@@ -148,7 +148,7 @@ Result<Rgba8Image> rgbFromYuv(std::span<const std::byte> frame, const YuvFormat&
                 for (int i = 0; i < cw; ++i) {
                     const float a = plane[static_cast<std::size_t>(j0) * cw + i];
                     const float b = plane[static_cast<std::size_t>(j1) * cw + i];
-                    chromaRow[k][static_cast<std::size_t>(i)] = a + (b - a) * weight;
+                    chromaRow[k][i] = a + (b - a) * weight;
                 }
             }
         }

@@ -157,7 +157,7 @@ void continueSide(Layer& layer, glm::ivec2 corner, glm::ivec2 along, glm::ivec2 
     std::vector<float> rim(static_cast<std::size_t>(count));
     for (int i = 0; i < count; ++i) {
         const glm::ivec2 at = corner + i * along;
-        rim[static_cast<std::size_t>(i)] = layer.front.at(at.x, at.y);
+        rim[i] = layer.front.at(at.x, at.y);
     }
     parallelFor(1, reach + 1, [&](int d) {
         const std::vector<float> row = withoutNarrow(rim, d);
@@ -167,7 +167,7 @@ void continueSide(Layer& layer, glm::ivec2 corner, glm::ivec2 along, glm::ivec2 
             const glm::ivec2 at = corner + i * along + d * outwards;
             if (!layer.part.contains(at.x, at.y)) break;
             if (along.y != 0 && i >= count) break;
-            const float p = row[static_cast<std::size_t>(std::clamp(i, 0, count - 1))];
+            const float p = row[std::clamp(i, 0, count - 1)];
             layer.part.at(at.x, at.y) = p < 0 ? Part::shown : Part::around;
             layer.front.at(at.x, at.y) = layer.far.at(at.x, at.y) = layer.parallax.at(at.x, at.y) =
                 p;
@@ -201,7 +201,7 @@ Image<glm::vec3> smoothShown(const Layer& layer, int deviation) {
             const int u = x + k * step.x, v = y + k * step.y;
             if (!layer.inPhoto(u, v) || std::abs(layer.front.at(u, v) - own) > 2 * kOneSurface)
                 continue;
-            const float weight = weightOf[static_cast<std::size_t>(std::abs(k))];
+            const float weight = weightOf[std::abs(k)];
             weights += weight;
             sum += weight * of.at(u, v);
         }

@@ -180,7 +180,7 @@ std::int64_t drawBehind(const Layer& layer, const Sources& sources, const Refere
             if (photo.depth.contains(u, v)) {
                 // Never before what is there.
                 if (hasPoint(photo.depth.at(u, v))) depth = std::max(depth, photo.depth.at(u, v));
-                ++hidden[static_cast<std::size_t>(y)];
+                ++hidden[y];
             }
             out.depth.at(x, y) = depth;
             put(out.texture, x, y, sample.colour + detailAt(layer, sources, photo, *block, {x, y}));

@@ -122,8 +122,8 @@ glm::vec3 colourAt(const WarpFrame& frame, const Spot& spot, float x, float y) {
     glm::vec3 sum(0.0f), least(1e30f), most(-1e30f);
     for (int j = 0; j < 4; ++j) {
         const glm::vec3* r = &colour.at(ix - 1, iy - 1 + j);
-        sum += down[static_cast<std::size_t>(j)] *
-               (across[0] * r[0] + across[1] * r[1] + across[2] * r[2] + across[3] * r[3]);
+        sum +=
+            down[j] * (across[0] * r[0] + across[1] * r[1] + across[2] * r[2] + across[3] * r[3]);
         least = glm::min(glm::min(least, glm::min(r[0], r[1])), glm::min(r[2], r[3]));
         most = glm::max(glm::max(most, glm::max(r[0], r[1])), glm::max(r[2], r[3]));
     }

@@ -105,8 +105,7 @@ std::vector<int> chooseKeys(std::span<const Glimpse> glimpses, int most) {
         const double least = keys.empty() ? 0.0 : kWorthIt * static_cast<double>(points.size());
         if (best < 0 || static_cast<double>(bestAdds) < least) break;
         keys.push_back(best);
-        for (std::size_t k = 0; k < points.size(); ++k)
-            covered[k] |= seen[static_cast<std::size_t>(best)][k];
+        for (std::size_t k = 0; k < points.size(); ++k) covered[k] |= seen[best][k];
     }
     return keys;
 }

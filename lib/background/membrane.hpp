@@ -35,12 +35,12 @@ struct Membrane {
             const auto& fields = turn[round % 2];
             parallelFor(0, fields.size(), kGrain, [&](std::size_t i) {
                 const std::int32_t at = fields[i];
-                const Unknown& u = unknowns[static_cast<std::size_t>(at)];
+                const Unknown& u = unknowns[at];
                 if (!(u.count > 0)) return;
                 Value sum = u.known;
                 for (const std::int32_t n : u.to)
-                    if (n >= 0) sum += values[static_cast<std::size_t>(n)];
-                Value& value = values[static_cast<std::size_t>(at)];
+                    if (n >= 0) sum += values[n];
+                Value& value = values[at];
                 value += relaxation * (sum / u.count - value);
             });
         }

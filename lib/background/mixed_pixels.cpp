@@ -69,9 +69,8 @@ Image<std::uint8_t> mixedPixels(const Image<float>& inverse, const DepthNoise& n
             if (y + 1 < h) take(row, inverse.row(y + 1).data(), w, 0);
             std::uint8_t* out = across.row(y - top).data();
             for (int x = 0; x < w; ++x)
-                out[x] = edge[static_cast<std::size_t>(x)] |
-                         edge[static_cast<std::size_t>(std::max(x - kReach, 0))] |
-                         edge[static_cast<std::size_t>(std::min(x + kReach, w - 1))];
+                out[x] =
+                    edge[x] | edge[std::max(x - kReach, 0)] | edge[std::min(x + kReach, w - 1)];
         }
     });
     Image<std::uint8_t> mixed(w, to - from, std::uint8_t{0});

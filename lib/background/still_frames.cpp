@@ -33,8 +33,7 @@ std::vector<int> spreadFrames(int count, int wanted) {
     const int n = wanted == 0 ? count : std::min(count, wanted);
     std::vector<int> which(static_cast<std::size_t>(n));
     for (std::int64_t i = 0; i < n; ++i)
-        which[static_cast<std::size_t>(i)] =
-            n == 1 ? 0 : static_cast<int>((i * (count - 1) + (n - 1) / 2) / (n - 1));
+        which[i] = n == 1 ? 0 : static_cast<int>((i * (count - 1) + (n - 1) / 2) / (n - 1));
     return which;
 }
 

@@ -57,8 +57,7 @@ std::array<glm::vec3, 9> harmonicsOf(const std::vector<Piece>& pieces) {
                                  0.315392 * (3 * z * z - 1),
                                  1.092548 * x * z,
                                  0.546274 * (x * x - y * y)};
-        for (int i = 0; i < 9; ++i)
-            sums[static_cast<std::size_t>(i)] += glm::dvec3(p.light) * (basis[i] * p.solidAngle);
+        for (int i = 0; i < 9; ++i) sums[i] += glm::dvec3(p.light) * (basis[i] * p.solidAngle);
     }
     // Lambert's cosine over pi: 1, 2/3 and 1/4 of the orders; times the basis' own constants.
     const double factors[9] = {0.282095,         0.488603 * 2 / 3, 0.488603 * 2 / 3,
@@ -75,8 +74,7 @@ Environment lobesOf(const std::vector<Piece>& pieces, float shininess) {
     constexpr int kSteps = 4096;
     std::vector<float> power(kSteps + 2);
     for (int i = 0; i <= kSteps + 1; ++i)
-        power[static_cast<std::size_t>(i)] =
-            std::pow(std::min(1.0f, static_cast<float>(i) / kSteps), shininess);
+        power[i] = std::pow(std::min(1.0f, static_cast<float>(i) / kSteps), shininess);
     const float least = std::pow(kLeastWeight, 1.0f / shininess);
     Environment lobes;
     for (int f = 0; f < 6; ++f) {
@@ -123,7 +121,7 @@ std::vector<glm::vec3> tableOf(const EnvironmentMap& lobes) {
 struct Harmonics {
     const std::array<glm::vec3, 9>& values;
     using vec3 = glsl::vec3;
-    [[nodiscard]] vec3 harmonic(int i) const { return values[static_cast<std::size_t>(i)]; }
+    [[nodiscard]] vec3 harmonic(int i) const { return values[i]; }
 #include "shaders/shared/environment_light.glsl"
 };
 

@@ -279,7 +279,7 @@ Place latlongPlace(glm::vec3 d) {
 
 template <class P>
 glm::vec4 filtered(const Pyramids<P>& pictures, const Place& at, float texels) {
-    const auto& levels = pictures.faces[at.face];
+    const auto& levels = pictures.faces[static_cast<std::size_t>(at.face)];
     if (levels.empty()) return glm::vec4(0.0f);
     glm::vec4 p;
     if (!(texels > 1.0f) || levels.size() == 1) {

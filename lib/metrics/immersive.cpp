@@ -55,16 +55,14 @@ double likestSum(const Image<float>& from, const Image<float>& to, float shift,
                 const int end = std::min(width, width - dx);
                 for (int x = std::max(0, -dx); x < end; ++x) {
                     const float d = a[x] + shift - b[x + dx];
-                    best[static_cast<std::size_t>(x)] =
-                        std::min(best[static_cast<std::size_t>(x)], d * d);
+                    best[x] = std::min(best[x], d * d);
                 }
             }
         }
         double sum = 0;
         for (int x = 0; x < width; ++x)
-            if (within(settings, x, y))
-                sum += static_cast<double>(best[static_cast<std::size_t>(x)]);
-        rows[static_cast<std::size_t>(y)] = sum;
+            if (within(settings, x, y)) sum += static_cast<double>(best[x]);
+        rows[y] = sum;
     });
     double sum = 0;
     for (const double row : rows) sum += row;

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <utility>
 
-#include "lib/base/parallel.hpp"
+#include "lib/base/parallel_try.hpp"
 
 namespace stx {
 
@@ -239,24 +239,19 @@ Result<Bundle> someViews(
     const ViewTable& table, const std::vector<bool>& wanted, PixelSpool* spool, Job& job,
     const std::function<Result<void>(std::size_t, const ReferenceView&)>& look) {
     Bundle bundle = headersOf(table.about());
-    const auto count = static_cast<std::int64_t>(table.count());
     const auto all = std::ranges::count(wanted, true);
-    std::vector<Result<void>> done(table.count());
     std::atomic<std::int64_t> finished = 0;
-    parallelFor(0, count, [&](std::size_t index) {
-        if (!wanted[index]) return;
-        done[index] = [&]() -> Result<void> {
-            STX_CHECK(job.checkCancelled());
-            STX_TRY(auto view, table.view(index, job));
-            if (look) STX_CHECK(look(index, *view));
-            bundle.views[index] = std::move(*ownView(std::move(view)));
-            bundle.views[index].moveTo(spool);
-            job.progress(++finished, all, "reading views");
-            return {};
-        }();
+    const auto read = parallelTry(0, table.count(), [&](std::size_t index) -> Result<void> {
+        if (!wanted[index]) return {};
+        STX_CHECK(job.checkCancelled());
+        STX_TRY(auto view, table.view(index, job));
+        if (look) STX_CHECK(look(index, *view));
+        bundle.views[index] = std::move(*ownView(std::move(view)));
+        bundle.views[index].moveTo(spool);
+        job.progress(++finished, all, "reading views");
+        return {};
     });
-    for (Result<void>& result : done)
-        if (!result) return propagate(result);
+    STX_CHECK(read);
     return bundle;
 }
 
@@ -369,16 +364,12 @@ Result<void> forEachView(
     for (std::size_t first = 0; first < count; first += atOnce) {
         if (enough && enough()) return {};
         const std::size_t end = std::min<std::size_t>(first + atOnce, count);
-        std::vector<Result<void>> done(end - first);
-        parallelFor(first, end, [&](std::size_t index) {
-            done[index - first] = [&]() -> Result<void> {
-                STX_CHECK(job.checkCancelled());
-                STX_TRY(auto view, table.view(index, job));
-                return each(index, std::move(view));
-            }();
+        const auto read = parallelTry(first, end, [&](std::size_t index) -> Result<void> {
+            STX_CHECK(job.checkCancelled());
+            STX_TRY(auto view, table.view(index, job));
+            return each(index, std::move(view));
         });
-        for (std::size_t i = first; i < end; ++i)
-            if (!done[i - first]) return propagate(done[i - first]);
+        STX_CHECK(read);
         for (std::size_t i = first; inOrder && i < end; ++i) STX_CHECK(inOrder(i));
     }
     return {};

@@ -34,16 +34,16 @@ void smooth(Image<glm::vec4>& image, int radius, bool around) {
     const auto run = [&](int count, bool closed, const auto& at) {
         for (int i = -radius; i <= count + radius; ++i) {
             const bool inside = i >= 0 && i < count;
-            line[static_cast<std::size_t>(i + radius)] = inside   ? at(i)
-                                                         : closed ? at((i % count + count) % count)
-                                                                  : glm::vec4(0);
+            line[i + radius] = inside   ? at(i)
+                               : closed ? at((i % count + count) % count)
+                                        : glm::vec4(0);
         }
         glm::dvec4 sum(0);
-        for (int i = 0; i < 2 * radius; ++i) sum += glm::dvec4(line[static_cast<std::size_t>(i)]);
+        for (int i = 0; i < 2 * radius; ++i) sum += glm::dvec4(line[i]);
         for (int i = 0; i < count; ++i) {
-            sum += glm::dvec4(line[static_cast<std::size_t>(i + 2 * radius)]);
+            sum += glm::dvec4(line[i + 2 * radius]);
             at(i) = glm::vec4(sum / (2.0 * radius + 1));
-            sum -= glm::dvec4(line[static_cast<std::size_t>(i)]);
+            sum -= glm::dvec4(line[i]);
         }
     };
     for (int pass = 0; pass < kBoxes; ++pass) {
@@ -168,14 +168,12 @@ std::vector<glm::dvec3> findGains(const std::vector<Footprint>& prints, int grid
                         : prints[a].clearing.at(pa.x, pa.y) / prints[b].clearing.at(pb.x, pb.y);
                 for (int c = 0; c < 3; ++c)
                     if (std::min(ca[c], cb[c]) > kDarkest && std::max(ca[c], cb[c]) < kLightest)
-                        logs[static_cast<std::size_t>(c)].push_back(
-                            std::log(ca[c] / cb[c] * clearing));
+                        logs[c].push_back(std::log(ca[c] / cb[c] * clearing));
             });
             if (std::min({logs[0].size(), logs[1].size(), logs[2].size()}) < kFewestShared)
                 continue;
             Ratio ratio{a, b, {}, std::sqrt(static_cast<double>(logs[1].size()))};
-            for (int c = 0; c < 3; ++c)
-                ratio.log[c] = medianOf(std::move(logs[static_cast<std::size_t>(c)]));
+            for (int c = 0; c < 3; ++c) ratio.log[c] = medianOf(std::move(logs[c]));
             rows[a].push_back(ratio);
         }
     });

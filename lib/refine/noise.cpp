@@ -242,8 +242,8 @@ float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm
             }
             if (value > 0.0f) q.at(x, y) = value;
             if (surface) surface->at(x, y) = glm::vec3(slope, doubt);
-            left[static_cast<std::size_t>(y)] += doubt / axis.relativeScale(here);
-            ++points[static_cast<std::size_t>(y)];
+            left[y] += doubt / axis.relativeScale(here);
+            ++points[y];
         }
     });
     return kDoubt * static_cast<float>(meanOfRows(left, points).value_or(0));

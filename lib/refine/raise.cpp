@@ -155,7 +155,7 @@ class RaisedStrip {
         const PerSurface sum = costsOf(pixel);
         for (std::size_t way = 0; way < 4; ++way) {
             if (pixel.beside[way] < 0) continue;
-            RaisedPixel& other = pixels_[static_cast<std::size_t>(pixel.beside[way])];
+            RaisedPixel& other = pixels_[pixel.beside[way]];
             PerSurface& out = other.heard[way ^ 1];
             float least = std::numeric_limits<float>::max();
             for (int l = 0; l < other.count; ++l) {
@@ -170,7 +170,7 @@ class RaisedStrip {
                 out[m] = best;
                 least = std::min(least, best);
             }
-            for (int l = 0; l < other.count; ++l) out[static_cast<std::size_t>(l)] -= least;
+            for (int l = 0; l < other.count; ++l) out[l] -= least;
         }
     }
 

@@ -217,8 +217,7 @@ SurfacesAround CoarseDepth::surfacesAround(int x, int y) const {
         out.surfaces[k] = {samples[group.to - 1].inverse, samples[group.from].inverse,
                            group.sum.plane()};
         for (std::size_t i = group.from; i < group.to; ++i)
-            out.of[static_cast<std::size_t>((samples[i].y + kRaiseReach) * kRaiseSide +
-                                            samples[i].x + kRaiseReach)] =
+            out.of[(samples[i].y + kRaiseReach) * kRaiseSide + samples[i].x + kRaiseReach] =
                 static_cast<std::uint8_t>(k);
     }
     return out;
@@ -242,15 +241,13 @@ std::array<float, kRaisedSurfaces> CoarseDepth::costs(const SurfacesAround& arou
         const Colours& own = colours_.at(middle.x + x - kRaiseReach, middle.y + y - kRaiseReach);
         const glm::vec3 off = colour - own.mean;
         const float like = own.norm * std::exp(-0.5f * glm::dot(off * off, own.sharpness));
-        const float weight =
-            nearX[static_cast<std::size_t>(x)] * nearY[static_cast<std::size_t>(y)];
+        const float weight = nearX[x] * nearY[y];
         alike[k] += weight * (like + kAnyColour);
         total += weight * (like + kAnyColour);
         near[k] += weight;
         mattes[k] += weight * own.matte;
     }
-    const float span =
-        around.surfaces[0].high - around.surfaces[static_cast<std::size_t>(around.count - 1)].low;
+    const float span = around.surfaces[0].high - around.surfaces[around.count - 1].low;
     float between = 0;
     (void)isOneSurface(at, between);
     const float matte = matteAt(at);

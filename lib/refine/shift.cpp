@@ -78,7 +78,7 @@ float inPicture(const Image<float>& picture, double x, int y, double down) {
     std::array<float, 4> column{};
     for (int k = 0; k < 4; ++k) {
         const int v = std::clamp(above - 1 + k, 0, picture.height() - 1);
-        column[static_cast<std::size_t>(k)] = inRow(picture.row(v).data(), x);
+        column[k] = inRow(picture.row(v).data(), x);
     }
     return between(column.data(), static_cast<float>(down - std::floor(down)));
 }
@@ -132,7 +132,7 @@ double shiftAlongRows(const Image<float>& disparities, const Image<float>& own,
                 sum += std::min(std::abs(there - own.at(p.x, p.y)), kMostDifference);
             }
         }
-        differences[static_cast<std::size_t>(n)] = sum;
+        differences[n] = sum;
     });
     const auto best =
         static_cast<std::size_t>(std::ranges::min_element(differences) - differences.begin());

@@ -83,9 +83,9 @@ DepthDisagreement disagreement(std::span<const DepthView> views, const std::vect
     std::vector<OfPair> found(pairs.size());
     parallelFor(0, pairs.size(), [&](std::size_t i) {
         const Pair& pair = pairs[i];
-        const DepthView& from = views[static_cast<std::size_t>(pair.from)];
-        found[i] = measurePair(gridOfPoints(*from.depth, kMeasured), *from.header,
-                               views[static_cast<std::size_t>(pair.to)], settings.overlapTolerance);
+        const DepthView& from = views[pair.from];
+        found[i] = measurePair(gridOfPoints(*from.depth, kMeasured), *from.header, views[pair.to],
+                               settings.overlapTolerance);
     });
     return togetherOf(pairs, found, views.size());
 }

@@ -81,8 +81,8 @@ struct PointResiduals {
 /// The points of pair.from that pair.to sees, too, with both differences there.
 std::vector<PointResiduals> compare(const std::vector<PoseSample>& views, const Pair& pair,
                                     int level, double tolerance) {
-    const PoseSample& from = views[static_cast<std::size_t>(pair.from)];
-    const PoseSample& to = views[static_cast<std::size_t>(pair.to)];
+    const PoseSample& from = views[pair.from];
+    const PoseSample& to = views[pair.to];
     const Camera& own = from.header.camera;
     const Camera& camera = to.header.camera;
     const Pose target(camera);

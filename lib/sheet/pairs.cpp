@@ -100,10 +100,10 @@ Result<Sheet> sheetOf(const std::vector<SheetPair>& pairs, const SheetSettings& 
     int next = 0;
     for (int i = 0; i < content.groups; ++i) {
         STX_CHECK(job.checkCancelled());
-        const SheetPair& pair = *rows[static_cast<std::size_t>(i)].pair;
+        const SheetPair& pair = *rows[i].pair;
         const bool shown = next < plan.shown && plan.groupAt(next) == i;
         if (shown) ++next;
-        if (rows[static_cast<std::size_t>(i)].depth) {
+        if (rows[i].depth) {
             if (!shown) continue;
             if (pair.depthA.size() != pair.depthB.size())
                 return failAt(pair.title, ErrorCode::invalidInput,

@@ -181,7 +181,7 @@ class CloudMaker {
         const std::size_t first = at_;
         at_ += rows.back();
         parallelFor(0, image.height(), [&](std::int64_t y) {
-            std::size_t i = first + rows[static_cast<std::size_t>(y)];
+            std::size_t i = first + rows[y];
             for (const Disc& d : image.row(static_cast<int>(y)))
                 if (d.colour.w > 0.0f) setSplat(cloud, i++, d, origin_, static_cast<float>(size_));
         });

@@ -139,8 +139,7 @@ class SceneReader {
             auto& node = nodes_[*it];
             node.worldFromNode = node.parent < 0
                                      ? node.parentFromNode
-                                     : nodes_[static_cast<std::size_t>(node.parent)].worldFromNode *
-                                           node.parentFromNode;
+                                     : nodes_[node.parent].worldFromNode * node.parentFromNode;
         }
         return {};
     }

@@ -337,7 +337,7 @@ Result<void> BifsNodeReader::readFields(Node& node, int depth) {
 }
 
 Result<void> BifsNodeReader::readInto(Node& node, int index, int depth) {
-    const FieldInfo& field = node.info->fields[static_cast<std::size_t>(index)];
+    const FieldInfo& field = node.info->fields[index];
     if (field.type == FieldType::MFScript) return readScripts(node, index, depth);
     STX_TRY(FieldValue value, readField(*node.info, field, depth));
     quantisation.coded(field, value);

@@ -103,12 +103,11 @@ Result<void> BifsNodeReader::readScripts(Node& script, int index, int depth) {
     if (!in.flag()) {
         // The type of the table: the Script gets one of its own while this is read.
         const NodeInfo& table = *findNode("Script");
-        STX_CHECK(readEach(table, table.fields[static_cast<std::size_t>(index)], 6,
-                           [&](std::uint64_t) -> Result<void> {
-                               STX_TRY(ScriptText text, readScriptItem(script, depth));
-                               scripts.push_back(std::move(text));
-                               return check("Script.url");
-                           }));
+        STX_CHECK(readEach(table, table.fields[index], 6, [&](std::uint64_t) -> Result<void> {
+            STX_TRY(ScriptText text, readScriptItem(script, depth));
+            scripts.push_back(std::move(text));
+            return check("Script.url");
+        }));
     }
     // A url that is coded once more, empty, must not take away the program that brought fields.
     if (scripts.empty() && ownFieldCount(script) > 0) return {};
@@ -173,7 +172,7 @@ Result<std::string> BifsNodeReader::readScriptField(Node& script, int depth) {
         return fieldName;
     }
     if (field.kind == FieldKind::field && in.flag()) {
-        const FieldInfo own = script.info->fields[static_cast<std::size_t>(index)];
+        const FieldInfo own = script.info->fields[index];
         STX_TRY(FieldValue value, readField(*findNode("Script"), own, depth));
         STX_CHECK(useBudget(sizeof(Node::SetField)));
         script.set(index, std::move(value));
@@ -308,7 +307,7 @@ Result<void> BifsNodeReader::readLink(const NodePtr& node, int field) {
     STX_CHECK(check("the body of a PROTO"));
     if (id >= proto->type.fields.size())
         return error(ErrorCode::invalidInput, "{} has no field {}", proto->name, id);
-    const FieldInfo& own = node->info->fields[static_cast<std::size_t>(field)];
+    const FieldInfo& own = node->info->fields[field];
     const FieldInfo& linked = proto->type.fields[id];
     if (own.type != linked.type)
         return error(ErrorCode::invalidInput, "{}.{} is {} and IS {}, which is {}",

@@ -529,10 +529,10 @@ std::vector<const ObjectDescriptor*> Document::objectDescriptors(std::uint64_t u
             if (const auto* update = std::get_if<UpdateObjectDescriptors>(&command)) {
                 for (const ObjectDescriptor& descriptor : update->descriptors)
                     if (descriptor.id >= 0 && descriptor.id < 1024)
-                        current[static_cast<std::size_t>(descriptor.id)] = &descriptor;
+                        current[descriptor.id] = &descriptor;
             } else if (const auto* removal = std::get_if<RemoveObjectDescriptors>(&command)) {
                 for (const int id : removal->ids)
-                    if (id >= 0 && id < 1024) current[static_cast<std::size_t>(id)] = nullptr;
+                    if (id >= 0 && id < 1024) current[id] = nullptr;
             }
         }
     }

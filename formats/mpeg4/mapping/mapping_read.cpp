@@ -448,14 +448,13 @@ const char* nodeKindOf(const Document& document) {
         for (const auto& command : frame.commands) {
             forEachNode(command, [&](const NodePtr& node) {
                 for (int i = 0; i < static_cast<int>(kKinds.size()); ++i) {
-                    if (node->is(kKinds[static_cast<std::size_t>(i)]) ||
-                        (i == 1 && node->is("PointTextureV2")))
+                    if (node->is(kKinds[i]) || (i == 1 && node->is("PointTextureV2")))
                         best = std::max(best, i);
                 }
             });
         }
     }
-    return best < 0 ? "none" : kKinds[static_cast<std::size_t>(best)];
+    return best < 0 ? "none" : kKinds[best];
 }
 
 }  // namespace stx::mpeg4

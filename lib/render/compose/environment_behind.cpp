@@ -48,7 +48,7 @@ void putEnvironmentBehind(Frame& frame, const Camera& camera, const EnvironmentM
         const glm::vec3 begin =
             forward - up * static_cast<float>((y + 0.5 - camera.cy) / camera.fy);
         for (int x = 0; x < width; ++x) {
-            glm::vec4& colour = row[static_cast<std::size_t>(x)];
+            glm::vec4& colour = row[x];
             if (colour.a >= kCoveredInFull) {
                 colour /= colour.a;
                 continue;

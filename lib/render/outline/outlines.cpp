@@ -109,9 +109,9 @@ Outlines::Outlines(PageSet set) : set_(std::move(set)) {
     std::vector<std::vector<OutlineBlock>> found(rectangles.size());
     parallelFor(0, rectangles.size(), [&](std::int64_t n) {
         set_.settle();
-        const PageRectangle& r = rectangles[static_cast<std::size_t>(n)];
-        if (set_.views()[static_cast<std::size_t>(r.view)].unread) return;
-        const Page& page = set_.pages()[static_cast<std::size_t>(r.page)];
+        const PageRectangle& r = rectangles[n];
+        if (set_.views()[r.view].unread) return;
+        const Page& page = set_.pages()[r.page];
         for (int v = 0; v < r.height; v += kOutlineBlock) {
             for (int u = 0; u < r.width; u += kOutlineBlock) {
                 OutlineBlock b;
@@ -131,7 +131,7 @@ Outlines::Outlines(PageSet set) : set_(std::move(set)) {
                         b.zMax = std::max(b.zMax, depth[x]);
                     }
                 }
-                if (b.zMin < kNoDepth) found[static_cast<std::size_t>(n)].push_back(b);
+                if (b.zMin < kNoDepth) found[n].push_back(b);
             }
         }
     });
@@ -189,7 +189,7 @@ std::vector<std::uint8_t> Outlines::askedViews(const Camera& camera) const {
 
 OutlineDepths Outlines::depthsOf(const OutlineBlock& block) const {
     const PageRectangle& r = set_.rectangles()[block.rectangle];
-    const Page& page = set_.pages()[static_cast<std::size_t>(r.page)];
+    const Page& page = set_.pages()[r.page];
     const auto stride = static_cast<std::size_t>(page.width());
     return {page.depth->data() + static_cast<std::size_t>(r.pageY) * stride + r.pageX, stride};
 }
@@ -256,7 +256,7 @@ void Outlines::findBlocks(const Camera& camera, const std::vector<PixelMap>& map
     parallelFor(0, blocks_.size(), 512, [&](std::size_t n) {
         const OutlineBlock& b = blocks_[n];
         const PageRectangle& r = set_.rectangles()[b.rectangle];
-        if (!asked.empty() && !asked[static_cast<std::size_t>(r.view)]) return;
+        if (!asked.empty() && !asked[r.view]) return;
         const auto& [a0, au, av, b0, bu, bv] = coarseMaps[b.rectangle];
         // Eight corners side by side, so that compilers make vectors of it.
         std::array<float, 8> x, y, along;
@@ -290,8 +290,8 @@ void Outlines::findBlocks(const Camera& camera, const std::vector<PixelMap>& map
     });
     for (std::size_t n = 0; n < blocks_.size(); ++n)
         for (int b = reached[n].from / kBandRows; b <= reached[n].to / kBandRows; ++b)
-            if (reached[n].to >= 0 && bands_[static_cast<std::size_t>(b)].any)
-                bands_[static_cast<std::size_t>(b)].blocks.push_back(static_cast<std::uint32_t>(n));
+            if (reached[n].to >= 0 && bands_[b].any)
+                bands_[b].blocks.push_back(static_cast<std::uint32_t>(n));
 }
 
 void Outlines::measureBand(std::size_t n, const Camera& camera, const std::vector<PixelMap>& maps,

@@ -40,10 +40,10 @@ Image<std::uint8_t> alphaOf(const PageSet& set, std::size_t number) {
     for (int y = 0; y < camera.height; ++y) {
         for (int x = 0; x < camera.width; ++x) {
             const PageRectangle* r = set.find(number, x, y);
-            alpha.at(x, y) = static_cast<std::uint8_t>(
-                r ? alphaOf(*set.pages()[static_cast<std::size_t>(r->page)].texture, r->texel(x, y))
-                : set.objectOutside(number, x, y) ? 255
-                                                  : 0);
+            alpha.at(x, y) =
+                static_cast<std::uint8_t>(r ? alphaOf(*set.pages()[r->page].texture, r->texel(x, y))
+                                          : set.objectOutside(number, x, y) ? 255
+                                                                            : 0);
         }
     }
     return alpha;
@@ -129,7 +129,7 @@ float Silhouettes::alphaBilinear(const View& view, double x, double y) const {
         return between(a[0], a[1], b[0], b[1]);
     }
     const PageRectangle* r = set_.find(view.number, ix, iy, ix + 1, iy + 1);
-    const Texture* texture = r ? set_.pages()[static_cast<std::size_t>(r->page)].texture : nullptr;
+    const Texture* texture = r ? set_.pages()[r->page].texture : nullptr;
     const auto at = [&](int i, int j) {
         if (r) return alphaOf(*texture, r->texel(i, j));
         return set_.objectOutside(view.number, i, j) ? 255.0f : 0.0f;

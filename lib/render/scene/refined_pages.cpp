@@ -10,13 +10,13 @@ namespace stx {
 RefineView viewImages(const PageSet& set, std::size_t number, ReferenceView& copy) {
     const PageView& view = set.views()[number];
     if (view.whole) {
-        const Page& page = set.pages()[static_cast<std::size_t>(set.rectanglesOf(number)[0].page)];
+        const Page& page = set.pages()[set.rectanglesOf(number)[0].page];
         return {&view, page.texture, page.depth};
     }
     copy.texture = set.textureOfView(number);
     copy.depth = Image<float>(view.camera.width, view.camera.height, kNoDepth);
     for (const PageRectangle& r : set.rectanglesOf(number)) {
-        const float* depth = set.pages()[static_cast<std::size_t>(r.page)].depth->data();
+        const float* depth = set.pages()[r.page].depth->data();
         for (int y = r.y0; y < r.y1; ++y)
             for (int x = r.x0; x < r.x1; ++x) copy.depth.at(x, y) = depth[r.texel(x, y)];
     }
@@ -84,7 +84,7 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report,
         better[i].giveTo(data->views[i]);
         if (!better[i].depth) continue;
         for (const PageRectangle& r : rectanglesOf(i)) {
-            auto& depth = depths[static_cast<std::size_t>(r.page)];
+            auto& depth = depths[r.page];
             const auto page = static_cast<std::size_t>(r.page);
             if (views()[i].whole) {
                 depth = std::make_shared<Image<float>>(std::move(*better[i].depth));

@@ -130,7 +130,7 @@ void CpuSplatRenderer::planFrame(const Camera& camera) {
     sources_.clear();
     for (const PageRectangle& r : set_.rectangles()) {
         const auto page = static_cast<std::size_t>(r.page);
-        if (set_.views()[static_cast<std::size_t>(r.view)].unread) {
+        if (set_.views()[r.view].unread) {
             sources_.emplace_back();
             continue;
         }
@@ -158,9 +158,7 @@ std::span<const std::uint32_t> CpuSplatRenderer::byColumn(int width) {
     for (std::size_t k = 1; k < first.size(); ++k) first[k] += first[k - 1];
     order_.resize(first.back());
     for (std::size_t i = 0; i < tasks_.size(); ++i)
-        if (seen_[i])
-            order_[first[static_cast<std::size_t>(tasks_[i].x0 / kColumn)]++] =
-                static_cast<std::uint32_t>(i);
+        if (seen_[i]) order_[first[tasks_[i].x0 / kColumn]++] = static_cast<std::uint32_t>(i);
     return order_;
 }
 
@@ -214,7 +212,7 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
         }
         for (int y = y0 / kRegionRows; y <= y1 / kRegionRows; ++y)
             for (int x = x0 / kRegionWidth; x <= x1 / kRegionWidth; ++x)
-                bins_[static_cast<std::size_t>(y * picture.across + x)].push_back(i);
+                bins_[y * picture.across + x].push_back(i);
     }
     {
         const StageTimer timer(settings_.log.get(), "draw");
@@ -274,7 +272,7 @@ void CpuSplatRenderer::drawRegion(Picture& picture, int index) {
     region.rows = std::min(kRegionRows, camera.height - region.top);
     region.stride = region.width + 2;
     region.orthographic = camera.orthographic;
-    const auto& bin = bins_[static_cast<std::size_t>(index)];
+    const auto& bin = bins_[index];
     if (bin.empty()) {
         for (int y = region.top; y < region.top + region.rows; ++y) {
             const auto fill = [&](auto& image, auto value) {

@@ -37,7 +37,7 @@ PointArrays makePointArrays(const PageSet& set, bool lit) {
         Image<glm::vec3> made;
         if (lit && !view.hasNormals) made = normalsOf(set.copyOfView(i));
         for (const PageRectangle& r : set.rectanglesOf(i)) {
-            const Page& page = set.pages()[static_cast<std::size_t>(r.page)];
+            const Page& page = set.pages()[r.page];
             for (int y = r.y0; y < r.y1; ++y) {
                 for (int x = r.x0; x < r.x1; ++x) {
                     const std::size_t texel = r.texel(x, y);
@@ -107,7 +107,7 @@ void groupPoints(const PointArrays& points, const RenderSettings& settings, cons
         out.indices[next[sizes[i]]++] = static_cast<std::uint32_t>(i);
     out.groups.clear();
     for (int s = 1; s <= top; ++s) {
-        const std::size_t first = start[static_cast<std::size_t>(s)];
+        const std::size_t first = start[s];
         const std::size_t n = start[static_cast<std::size_t>(s) + 1] - first;
         if (n > 0) out.groups.push_back({s, first, n});
     }
