@@ -350,13 +350,11 @@ Result<void> BatchRun::writeLines() const {
 
 }  // namespace
 
-void addJobsOption(Command command, BatchOptions& options, const char* heading) {
-    command
-        .option("--jobs,-j", options.jobs,
-                "Inputs at a time, each in a process of its own (default 1)")
+void addJobsOption(Command c, BatchOptions& options) {
+    c.option("--jobs,-j", options.jobs,
+             "Inputs at a time, each in a process of its own (default 1)")
         .range(1, 1024)
-        .takes("N")
-        .group(heading);
+        .takes("N");
 }
 
 namespace {

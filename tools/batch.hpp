@@ -26,8 +26,8 @@ struct BatchOptions {
     std::function<void(nlohmann::ordered_json&)> onEntry;
 };
 
-/// Adds --jobs, under a heading of the help.
-void addJobsOption(Command command, BatchOptions& options, const char* heading);
+/// Adds --jobs.
+void addJobsOption(Command command, BatchOptions& options);
 
 /// Replaces `@list.txt` by the names in that file (`@-`: in stdin), one in each line, relative to
 /// the current folder; empty lines and what follows a # that begins a line or comes after a blank

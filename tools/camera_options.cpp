@@ -47,127 +47,89 @@ Camera inPicture(const Camera& camera, const std::optional<glm::ivec2>& size) {
 
 namespace {
 
-constexpr const char* kCameraHeading = "Camera";
-
 /// A single camera.
-void addSingleCamera(Command& command, CameraOptions& o) {
-    const char* group = kCameraHeading;
-    command
-        .option(
-            "--eye", o.eye,
-            "Position of the camera in the world, in scene units (write --eye=-1,2,3 for a leading "
-            "minus). Where 'stx info' names an origin, it counts in: --eye, --target, --cameras "
-            "and point lights are in the coordinates of the model that was converted")
-        .takes("X,Y,Z")
-        .group(group);
-    command.option("--target", o.target, "What it looks at (default: the middle of the object)")
-        .takes("X,Y,Z")
-        .group(group);
-    command
-        .option("--up", o.up,
-                "What is up in the picture, and the axis of an orbit: Z, X,Y,Z or with a minus "
-                "--up=-Y (default: what the reference views have, else Y)")
-        .takes("AXIS")
-        .group(group);
-    command
-        .option("--fov", o.fovDeg,
-                "Vertical field of view in degrees, above 0 and below 180 (default 40)")
-        .takes("DEG")
-        .group(group);
-    command
-        .option("--ortho", o.orthoHeight,
-                "Orthographic camera with a window of this height, in scene units")
-        .takes("HEIGHT")
-        .group(group);
-    command.option("--view", o.view, "The camera of reference view K, from 0")
-        .takes("K")
-        .notNegative()
-        .group(group);
+void addSingleCamera(Command& c, CameraOptions& o) {
+    c.option(
+         "--eye", o.eye,
+         "Position of the camera in the world, in scene units (write --eye=-1,2,3 for a leading "
+         "minus). Where 'stx info' names an origin, it counts in: --eye, --target, --cameras "
+         "and point lights are in the coordinates of the model that was converted")
+        .takes("X,Y,Z");
+    c.option("--target", o.target, "What it looks at (default: the middle of the object)")
+        .takes("X,Y,Z");
+    c.option("--up", o.up,
+             "What is up in the picture, and the axis of an orbit: Z, X,Y,Z or with a minus "
+             "--up=-Y (default: what the reference views have, else Y)")
+        .takes("AXIS");
+    c.option("--fov", o.fovDeg,
+             "Vertical field of view in degrees, above 0 and below 180 (default 40)")
+        .takes("DEG");
+    c.option("--ortho", o.orthoHeight,
+             "Orthographic camera with a window of this height, in scene units")
+        .takes("HEIGHT");
+    c.option("--view", o.view, "The camera of reference view K, from 0").takes("K").notNegative();
 }
 
 /// Cameras on a circle, or around a view's own pose.
-void addPaths(Command& command, CameraOptions& o) {
-    const char* group = kCameraHeading;
-    command.option("--orbit", o.orbit, "N cameras on a circle around the object")
+void addPaths(Command& c, CameraOptions& o) {
+    c.option("--orbit", o.orbit, "N cameras on a circle around the object")
         .takes("N")
-        .range(1, 1000000)
-        .group(group);
-    command
-        .option("--elevation", o.elevationDeg,
-                "Height of the orbit above the horizon in degrees (default 15)")
+        .range(1, 1000000);
+    c.option("--elevation", o.elevationDeg,
+             "Height of the orbit above the horizon in degrees (default 15)")
         .takes("DEG")
-        .range(-90.0, 90.0)
-        .group(group);
-    command
-        .option("--radius", o.orbitRadius,
-                "Of the orbit, in scene units (default: the object fills the picture)")
+        .range(-90.0, 90.0);
+    c.option("--radius", o.orbitRadius,
+             "Of the orbit, in scene units (default: the object fills the picture)")
         .takes("R")
-        .positive()
-        .group(group);
-    command
-        .option("--start", o.startDeg,
-                "Where the orbit begins, in degrees from the front, counter-clockwise from above "
-                "(default 0)")
+        .positive();
+    c.option("--start", o.startDeg,
+             "Where the orbit begins, in degrees from the front, counter-clockwise from above "
+             "(default 0)")
         .takes("DEG")
-        .range(-360.0, 360.0)
-        .group(group);
-    command
-        .option("--arc", o.arcDeg,
-                "How far the orbit goes, in degrees; less than 360: the last camera is at its end "
-                "(default 360)")
+        .range(-360.0, 360.0);
+    c.option("--arc", o.arcDeg,
+             "How far the orbit goes, in degrees; less than 360: the last camera is at its end "
+             "(default 360)")
         .takes("DEG")
-        .range(-360.0, 360.0)
-        .group(group);
-    command
-        .option("--sway", o.swayPercent,
-                "Cameras on an ellipse around the pose of a reference view (--view K, else the "
-                "first), as far to each side as this percentage of the median distance of what it "
-                "shows, which stays in its place: the moves that one photograph with depth bears")
+        .range(-360.0, 360.0);
+    c.option("--sway", o.swayPercent,
+             "Cameras on an ellipse around the pose of a reference view (--view K, else the "
+             "first), as far to each side as this percentage of the median distance of what it "
+             "shows, which stays in its place: the moves that one photograph with depth bears")
         .takes("PERCENT")
-        .range(0.001, 100.0)
-        .group(group);
-    command
-        .option("--frames", o.swayFrames,
-                "Pictures of --sway, once around (default 50; of a film with --times one for each "
-                "of its pictures)")
+        .range(0.001, 100.0);
+    c.option("--frames", o.swayFrames,
+             "Pictures of --sway, once around (default 50; of a film with --times one for each "
+             "of its pictures)")
         .takes("N")
-        .range(1, 1000000)
-        .group(group);
+        .range(1, 1000000);
 }
 
 }  // namespace
 
-void addCameraOptions(Command command, CameraOptions& o) {
-    const char* group = kCameraHeading;
-    addSingleCamera(command, o);
-    addPaths(command, o);
-    command
-        .option(
-            "--cameras", o.cameraFile,
-            "Every camera of a file (transforms.json, camera_path.json, MIV JSON, cameras.json) or "
-            "of a COLMAP model")
-        .takes("FILE")
-        .group(group);
-    command
-        .choice<bool>(
-            "--camera-poses", o.aligned, {{"given", false}, {"aligned", true}},
-            "What the cameras of the file lie beside: given (the views as their image set had "
-            "them; "
-            "where refining moved the cameras of these, those of the file move as the ones near "
-            "them did) or aligned (the views as they are now; default given)")
-        .group(group);
-    command
-        .option("--dataparser", o.dataparser,
-                "dataparser_transforms.json of the training that a camera_path.json belongs to "
-                "(default: one beside it): its cameras then are in the world of the images")
-        .takes("FILE")
-        .group(group);
-    command
-        .option("--size", o.size,
-                "Size of the picture (default: that of the camera, else 512x512). Where its shape "
-                "is not the camera's, more is seen on the longer side: nothing is squeezed or cut")
-        .takes("WxH")
-        .group(group);
+void addCameraOptions(const Command& command, CameraOptions& o) {
+    Command c = command.under("Camera");
+    addSingleCamera(c, o);
+    addPaths(c, o);
+    c.option(
+         "--cameras", o.cameraFile,
+         "Every camera of a file (transforms.json, camera_path.json, MIV JSON, cameras.json) or "
+         "of a COLMAP model")
+        .takes("FILE");
+    c.choice<bool>(
+        "--camera-poses", o.aligned, {{"given", false}, {"aligned", true}},
+        "What the cameras of the file lie beside: given (the views as their image set had "
+        "them; where refining moved the cameras of these, those of the file move as the ones near "
+        "them did) or aligned (the views as they are now; default given)");
+    c.option("--dataparser", o.dataparser,
+             "dataparser_transforms.json of the training that a camera_path.json belongs to "
+             "(default: one beside it): its cameras then are in the world of the images")
+        .takes("FILE");
+    c.option("--size", o.size,
+             "Size of the picture (default: that of the camera, else 512x512). Where its shape "
+             "is not the camera's, more is seen on the longer side: nothing is squeezed or cut")
+        .takes("WxH");
 }
 
 Result<std::size_t> namedView(int view, const std::vector<ReferenceView>& views) {
@@ -241,9 +203,7 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
                                              Program& program) {
     STX_CHECK(checkWays(o));
     std::optional<glm::ivec2> size;
-    if (!o.size.empty()) {
-        STX_TRY(size, parseSize(o.size, program.job.limits));
-    }
+    if (!o.size.empty()) STX_SET(size, parseSize(o.size, program.job.limits));
     if (context.sway) {
         STX_TRY(const auto swaying, swayCameras(context.sway->camera, context.sway->distance,
                                                 o.swayPercent / 100, swayCount(o)));

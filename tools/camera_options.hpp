@@ -35,7 +35,7 @@ struct CameraOptions {
 /// and nothing of the view is cut: a picture of another shape shows more on its longer side.
 [[nodiscard]] Camera inPicture(const Camera& camera, const std::optional<glm::ivec2>& size);
 
-void addCameraOptions(Command command, CameraOptions& options);
+void addCameraOptions(const Command& command, CameraOptions& options);
 
 /// The number of cameras asked for. Errors (usage, io) that need no input to be seen: so they come
 /// before an hour of loading.

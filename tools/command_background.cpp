@@ -146,9 +146,8 @@ Result<int> behindOfStill(const BackgroundOptions& o, const Command& command, Se
     STX_CHECK(command.refuse({"--key-views", "--video", "--crf"},
                              fmt::format("is of films, and {} has one frame", where)));
     STX_TRY(Bundle bundle, frames.frame(0, program.job));
-    const auto added = addBehind(bundle, o.behind, program.job);
-    if (!added) return tl::unexpected(added.error().at(where));
-    program.job.note(added->note(o.behind));
+    STX_TRY(const auto added, within(where, addBehind(bundle, o.behind, program.job)));
+    program.job.note(added.note(o.behind));
     SaveOptions save;
     save.noClobber = program.common.noClobber;
     STX_CHECK(saveBundle(bundle, o.output, save, program.job));
@@ -165,11 +164,10 @@ Result<int> behindOfStill(const BackgroundOptions& o, const Command& command, Se
          {"output", o.output},
          {"method", "invented"},
          {"frames", 1},
-         {"views",
-          nlohmann::ordered_json::array({{{"name", added->name},
-                                          {"seen", added->seen},
-                                          {"hidden", added->hidden},
-                                          {"border", {added->border.x, added->border.y}}}})},
+         {"views", nlohmann::ordered_json::array({{{"name", added.name},
+                                                   {"seen", added.seen},
+                                                   {"hidden", added.hidden},
+                                                   {"border", {added.border.x, added.border.y}}}})},
          {"seconds", seconds}}));
     return 0;
 }
@@ -192,24 +190,25 @@ Result<int> backgroundOfBundle(const BackgroundOptions& o, const Command& comman
                     o.inputs[0], o.output);
     if (!frames->timeline().moves()) return behindOfStill(o, command, *frames, watch, program);
     STX_CHECK(command.refuse({"--shift"}, "is of one photograph; a film shows what is behind"));
-    auto found = rememberBackgrounds(
-        frames->timeline().times,
-        [&](std::size_t frame, Job& job) { return frames->frame(frame, job); }, o.temporal,
-        program.job);
-    if (!found) return tl::unexpected(found.error().at(fmt::format("'{}'", o.inputs[0])));
-    if (found->empty())
+    STX_TRY(auto found,
+            within(fmt::format("'{}'", o.inputs[0]),
+                   rememberBackgrounds(
+                       frames->timeline().times,
+                       [&](std::size_t frame, Job& job) { return frames->frame(frame, job); },
+                       o.temporal, program.job)));
+    if (found.empty())
         return failAt(fmt::format("'{}'", o.inputs[0]), ErrorCode::invalidInput,
                       "nothing that stays was seen by two frames or more; a background is made of "
                       "what stays");
     auto views = nlohmann::ordered_json::array();
-    for (const BackgroundModel& model : *found) {
+    for (const BackgroundModel& model : found) {
         const auto seen = model.view.pointCount();
         views.push_back(
             {{"name", model.view.name},
              {"seen", static_cast<double>(seen) / static_cast<double>(model.view.depth.count())}});
     }
     const Timeline timeline = frames->timeline();
-    frames = withBackgrounds(std::move(frames), std::move(*found));
+    frames = withBackgrounds(std::move(frames), std::move(found));
     SaveOptions save;
     save.noClobber = program.common.noClobber;
     if (!o.video.empty()) save.h264 = o.crf.value_or(18);
@@ -303,70 +302,56 @@ Result<int> background(const BackgroundOptions& o, const Command& command, Progr
     return backgroundOfFrames(o, program);
 }
 
-void addMaskOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
-    const char* masks = "Masks";
+void addMaskOptions(Command c, const std::shared_ptr<BackgroundOptions>& o) {
     c.option("--mask-of", o->maskOf,
              "Write what of this frame (from 0), or of all, is not background: white in a grey PNG")
-        .takes("FRAME|all")
-        .group(masks);
+        .takes("FRAME|all");
     c.option("--mask-output", o->maskOutput,
              "Names of the masks; %04d is the frame, {stem} the name of its file "
              "(default: the name of -o with _mask_%04d.png)")
-        .takes("PATTERN")
-        .group(masks);
+        .takes("PATTERN");
 }
 
 /// Of the method `select`.
-void addSelectOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
-    const char* select = "Method select";
+void addSelectOptions(Command c, const std::shared_ptr<BackgroundOptions>& o) {
     c.option("--quietest", o->settings.quietest, "Frames that are kept of each pixel (default 19)")
         .range(1, 255)
-        .takes("S")
-        .group(select);
+        .takes("S");
     c.option("--window", o->settings.windowDivisor,
              "Motion is summed over a square around the pixel: the picture's shorter side over "
              "this (default 6)")
         .range(1, 1000)
-        .takes("N")
-        .group(select);
+        .takes("N");
     c.option("--adaptive", o->settings.adaptive,
              "Keep frames with up to this many times the kept ones' mean motion, too; 0 keeps no "
              "more (default 1.15)")
         .range(0.0, 1000.0)
-        .takes("RATIO")
-        .group(select);
+        .takes("RATIO");
     c.flag("--drift", o->settings.drift,
-           "Motion is the change of gradients: light that changes slowly is none")
-        .group(select);
+           "Motion is the change of gradients: light that changes slowly is none");
 }
 
 /// Of bundles with time.
-void addFilmOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
-    const char* films = "Bundles with time";
+void addFilmOptions(Command c, const std::shared_ptr<BackgroundOptions>& o) {
     c.option("--key-views", o->temporal.keyViews,
              "Poses of cameras that move which get a background, at most; as many as see what all "
              "frames see (default 8)")
         .range(1, 64)
-        .takes("N")
-        .group(films);
+        .takes("N");
     c.option("--video", o->video,
              "h264: pictures that change as video, as stx convert does (.mp4, .xmt, .bt; default: "
              "each picture exact)")
-        .oneOf({"h264"})
-        .group(films);
-    c.option("--crf", o->crf, "Quality of --video's colour, 0 the best (default 18)")
-        .range(0, 51)
-        .group(films);
+        .oneOf({"h264"});
+    c.option("--crf", o->crf, "Quality of --video's colour, 0 the best (default 18)").range(0, 51);
 }
 
 /// Of bundles of one photograph.
-void addBehindOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
+void addBehindOptions(Command c, const std::shared_ptr<BackgroundOptions>& o) {
     c.option("--shift", o->behind.shiftPercent,
              "How far to the side an eye may go without a hole, percent of the median distance "
              "(default 8)")
         .range(0.001, kMostBehindPercent)
-        .takes("PERCENT")
-        .group("Bundles of one photograph");
+        .takes("PERCENT");
 }
 
 }  // namespace
@@ -415,10 +400,10 @@ void addBackground(CommandLine& line, Program& program) {
     c.option("--confidence", o->confidence,
              "Write how far frames agree with each pixel: 0 (none) to 255 (all)")
         .takes("FILE.png");
-    addMaskOptions(c, o);
-    addSelectOptions(c, o);
-    addFilmOptions(c, o);
-    addBehindOptions(c, o);
+    addMaskOptions(c.under("Masks"), o);
+    addSelectOptions(c.under("Method select"), o);
+    addFilmOptions(c.under("Bundles with time"), o);
+    addBehindOptions(c.under("Bundles of one photograph"), o);
     c.sharedOptions(program.common, kOutput | kPictures);
     c.runs([o, c](Program& p) { return background(*o, c, p); });
 }

@@ -45,19 +45,19 @@ Result<AblationSet> ablationSetOf(const std::string& input, Program& program) {
     OpenOptions open;
     open.set.refined = [&atImport](const RefineReport& found) { atImport = found; };
     STX_TRY(auto opened, openRenderable(input, open, program.job));
-    auto set = std::holds_alternative<Mesh>(opened)
-                   ? AblationSet::of(std::get<Mesh>(opened), program.job)
-                   : AblationSet::of(std::move(std::get<Bundle>(opened)));
-    if (!set) return tl::unexpected(set.error().at(fmt::format("'{}'", input)));
+    STX_TRY(auto set, within(fmt::format("'{}'", input),
+                             std::holds_alternative<Mesh>(opened)
+                                 ? AblationSet::of(std::get<Mesh>(opened), program.job)
+                                 : AblationSet::of(std::move(std::get<Bundle>(opened)))));
     const std::filesystem::path path(input);
     for (const RefineStepInfo& step : refineSteps())
-        if (atImport.of(step.step).views > 0) set->atImport.push_back(step.step);
-    set->importWithout = [input](RefineStep step, Job& job) {
+        if (atImport.of(step.step).views > 0) set.atImport.push_back(step.step);
+    set.importWithout = [input](RefineStep step, Job& job) {
         OpenOptions without;
         without.set.refine.set(step, false);
         return openBundle(input, without, job);
     };
-    set->name = (path.has_filename() ? path : path.parent_path()).stem().string();
+    set.name = (path.has_filename() ? path : path.parent_path()).stem().string();
     return set;
 }
 

@@ -61,9 +61,9 @@ Result<Scores> comparePair(const std::string& a, const std::string& b, const Com
     settings.mask = mask;
     STX_TRY(settings.background, parseColour(o.background, "--background"));
     Scores scores;
-    auto result = compare(first, second, settings, program.job);
-    if (!result) return tl::unexpected(result.error().at(fmt::format("'{}' and '{}'", a, b)));
-    scores.plain = *result;
+    STX_TRY(auto result, within(fmt::format("'{}' and '{}'", a, b),
+                                compare(first, second, settings, program.job)));
+    scores.plain = result;
     const bool linear = first.isLinear() && second.isLinear();
     if (linear)
         scores.immersive.add(first.linear, second.linear, settings);
@@ -180,11 +180,10 @@ Result<ManyScores> compareMany(const CompareOptions& o, bool folders,
                                const Image<std::uint8_t>* mask, Program& program) {
     ManyScores many;
     std::vector<Pair> pairs;
-    if (folders) {
-        STX_TRY(pairs, pairsOfFolders(o));
-    } else {
+    if (folders)
+        STX_SET(pairs, pairsOfFolders(o));
+    else
         pairs = pairsOfSequences(o);
-    }
     SequenceComparison sequence(255.0);
     for (const Pair& pair : pairs) {
         STX_CHECK(program.job.checkCancelled());
@@ -205,7 +204,7 @@ Result<ManyScores> compareMany(const CompareOptions& o, bool folders,
             program.print(printable(pair.name) + ": " + scoresOf(c, "") + "\n");
     }
     many.total.plain = sequence.total();
-    many.worst = pairs[static_cast<std::size_t>(sequence.worstFrame())];
+    many.worst = pairs[sequence.worstFrame()];
     return many;
 }
 

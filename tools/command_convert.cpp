@@ -129,13 +129,10 @@ Result<std::unique_ptr<ViewTable>> changedAsAsked(std::unique_ptr<ViewTable> tab
                                                   const ConvertOptions& o, LargestStep& step,
                                                   Program& program) {
     const auto bits = o.mesh->depthBits;
-    if (o.refining.steps != "auto") {
-        STX_TRY(table,
+    if (o.refining.steps != "auto")
+        STX_SET(table,
                 o.refining.refined(std::move(table), imported, folderOf(target), program.job));
-    }
-    if (o.cube) {
-        STX_TRY(table, cubeOf(std::move(table), folderOf(target), program.job));
-    }
+    if (o.cube) STX_SET(table, cubeOf(std::move(table), folderOf(target), program.job));
     // Readers of image sets have said it for what they made.
     if (!bits || std::ranges::all_of(std::as_const(*table).about().views,
                                      [&](const auto& v) { return v.depthBits == *bits; }))
@@ -152,9 +149,7 @@ Result<Converted> convertStill(const std::filesystem::path& input,
     auto* mesh = std::get_if<Mesh>(&opened);
     noteUnused(input, mesh ? Reads::mesh : Reads::moment, o, program);
     std::shared_ptr<const Environment> environment;
-    if (o.environment.given()) {
-        STX_TRY(environment, environmentOf(o.environment, program.job));
-    }
+    if (o.environment.given()) STX_SET(environment, environmentOf(o.environment, program.job));
     Converted done;
     ViewTally tally;
     LargestStep step;
@@ -175,8 +170,8 @@ Result<Converted> convertStill(const std::filesystem::path& input,
         return saveViews(*table, target, options, job);
     };
     if (mesh) {
-        if (auto saved = withMeshViews(*mesh, *o.mesh, program, save); !saved)
-            return tl::unexpected(saved.error().at(fmt::format("'{}'", input.string())));
+        STX_CHECK(within(fmt::format("'{}'", input.string()),
+                         withMeshViews(*mesh, *o.mesh, program, save)));
     } else {
         STX_TRY(auto table, changedAsAsked(std::move(std::get<1>(opened)), *imported, target, o,
                                            step, program));
@@ -266,12 +261,8 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
             done = summaryOf(*passed, countPoints);
         }
     }
-    if (!done) {
-        STX_TRY(done, convertSequence(input, target, o, countPoints, program));
-    }
-    if (!done) {
-        STX_TRY(done, convertStill(input, target, o, countPoints, program));
-    }
+    if (!done) STX_SET(done, convertSequence(input, target, o, countPoints, program));
+    if (!done) STX_SET(done, convertStill(input, target, o, countPoints, program));
     const Timeline& timeline = done->timeline;
     if (!o.video.empty() && !timeline.moves())
         program.job.note("--video is of films and not used: nothing moves");
@@ -339,9 +330,8 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
         std::error_code ec;
         nlohmann::ordered_json entry = {
             {"input", o.inputs[0]}, {"output", target}, {"status", "skipped"}, {"exitCode", 0}};
-        if (!o.batch.skipExisting || !std::filesystem::exists(target, ec)) {
-            STX_TRY(entry, convertOne(o.inputs[0], target, one, program));
-        }
+        if (!o.batch.skipExisting || !std::filesystem::exists(target, ec))
+            STX_SET(entry, convertOne(o.inputs[0], target, one, program));
         if (o.batch.shard.given) {
             entry["index"] = i;
             entry["shard"] = shardJson(o.batch.shard, total);
@@ -424,107 +414,84 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
 }
 
 /// How pictures and scenes are coded.
-void addCodingOptions(Command& c, const std::shared_ptr<ConvertOptions>& o) {
-    const char* coding = "Coding";
+void addCodingOptions(Command c, const std::shared_ptr<ConvertOptions>& o) {
     c.option("--colour", o->colour, "png (exact) or jpeg, in MPEG-4 containers (default png)")
-        .oneOf({"png", "jpeg"})
-        .group(coding);
-    c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100).group(coding);
+        .oneOf({"png", "jpeg"});
+    c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100);
     c.option("--video", o->video,
              "h264: pictures of a film that change as video (MPEG-4; needs the module of video): "
              "colour lossy, depth lossless in 8 or 10 bits (default: each picture exact)")
-        .oneOf({"h264"})
-        .group(coding);
-    c.option("--crf", o->crf, "Quality of --video's colour, 0 the best (default 18)")
-        .range(0, 51)
-        .group(coding);
-    c.flag("--point-texture", o->pointTexture, "Write PointTexture nodes (MPEG-4)").group(coding);
+        .oneOf({"h264"});
+    c.option("--crf", o->crf, "Quality of --video's colour, 0 the best (default 18)").range(0, 51);
+    c.flag("--point-texture", o->pointTexture, "Write PointTexture nodes (MPEG-4)");
     c.option("--octree-image", o->octreeLevels,
              "Write an OctreeImage (MPEG-4): 2^LEVELS voxels on a side, a picture for each view")
         .range(1, 16)
-        .takes("LEVELS")
-        .group(coding);
+        .takes("LEVELS");
     c.flag("--cube", o->cube,
            "Of a sensor that turned in place: the views become the six faces of a cube around it, "
-           "seen from inside")
-        .group(coding);
+           "seen from inside");
     c.option("--bifs-version", o->bifsVersion,
              "Of an MPEG-4 scene's stream: 1 or 2 (default 1, or as the input has it)")
-        .range(1, 2)
-        .group(coding);
+        .range(1, 2);
 }
 
-void addBatchOptions(Command& c, const std::shared_ptr<ConvertOptions>& o) {
-    const char* many = "Many inputs";
-    addJobsOption(c, o->batch, many);
-    c.flag("--keep-going,-k", o->batch.keepGoing, "Go on with the others when an input fails")
-        .group(many);
-    c.flag("--skip-existing", o->batch.skipExisting, "Pass over inputs whose output exists")
-        .group(many);
-    addShardOption(c, o->batch.shard, "inputs, or of --frames", many);
+void addBatchOptions(Command c, const std::shared_ptr<ConvertOptions>& o) {
+    addJobsOption(c, o->batch);
+    c.flag("--keep-going,-k", o->batch.keepGoing, "Go on with the others when an input fails");
+    c.flag("--skip-existing", o->batch.skipExisting, "Pass over inputs whose output exists");
+    addShardOption(c, o->batch.shard, "inputs, or of --frames");
 }
 
 /// What of an image set is read.
 void addSetOptions(Command& c, const std::shared_ptr<ConvertOptions>& o) {
-    const char* sets = kSetHeading;
     std::vector<std::string> kinds;
     for (const ImageSetKind& kind : imageSetKinds()) kinds.emplace_back(kind.name);
     c.option("--from", o->open.set.from, "Kind of image set, when the files do not show it")
-        .oneOf(kinds)
-        .group(sets);
+        .oneOf(kinds);
     c.option("--frame", o->open.set.frame,
              "Only this frame of a set that has time, from 0 (default: all, where OUT takes them)")
-        .notNegative()
-        .group(sets);
+        .notNegative();
     c.option("--frames", o->frames, "One bundle for each of them; OUT has {frame} in it")
-        .takes("A-B")
-        .group(sets);
-    c.flag("--still", o->still, "All pictures are of one moment, whatever times they have")
-        .group(sets);
+        .takes("A-B");
+    c.flag("--still", o->still, "All pictures are of one moment, whatever times they have");
     c.flag(
-         "--moving", o->moving,
-         "Pictures with times are of a scene that moves: of recordings (TUM), which are taken for "
-         "one moment seen from many sides")
-        .group(sets);
+        "--moving", o->moving,
+        "Pictures with times are of a scene that moves: of recordings (TUM), which are taken for "
+        "one moment seen from many sides");
     c.option("--every", o->open.set.every,
              "Take each N-th view of a recording, or each N-th frame (default 1)")
         .range(1, 1000000)
-        .takes("N")
-        .group(sets);
+        .takes("N");
     c.flag(
-         "--strict", o->open.set.strict,
-         "Stop at a view whose files are missing (transforms, TUM, 7-Scenes), instead of leaving "
-         "it out, and at frames of films that are missing or damaged, instead of showing the ones "
-         "before")
-        .group(sets);
+        "--strict", o->open.set.strict,
+        "Stop at a view whose files are missing (transforms, TUM, 7-Scenes), instead of leaving "
+        "it out, and at frames of films that are missing or damaged, instead of showing the ones "
+        "before");
 }
 
 /// Where the files of a set are, and how to read them.
 void addSetFiles(Command& c, const std::shared_ptr<ConvertOptions>& o) {
-    const char* sets = kSetHeading;
     auto& set = o->open.set;
     c.option(
          "--depth", set.depthPattern,
          "Names of the depth images, {name} {w} {h} {format} {frame} in them; --texture "
          "likewise. Both may be films (.mp4, .mov, .mkv, .webm, .avi), of the cameras in IN. Of "
          "a photo: the picture of its depth, {stem} in it the photo's name")
-        .takes("PATTERN")
-        .group(sets);
+        .takes("PATTERN");
     c.option("--mask", set.maskPattern,
              "Names of pictures that are white where the object is, {stem} of the colour picture's "
              "file or {name} in them, beside the set or in the current folder; 'stx background "
              "--mask-of "
              "all' makes such masks")
-        .takes("PATTERN")
-        .group(sets);
+        .takes("PATTERN");
     c.choice<std::optional<NoDepth>>(
-         "--no-depth", set.noDepth,
-         {{"auto", std::nullopt}, {"unknown", NoDepth::unknown}, {"empty", NoDepth::empty}},
-         "What pixels without depth are: empty (nothing is there: seen past) or unknown (a "
-         "surface that the sensor missed). auto: as the depth says (infinity or 1e9 and more is "
-         "empty), else empty where a picture has transparent pixels or a mask, and unknown where "
-         "not")
-        .group(sets);
+        "--no-depth", set.noDepth,
+        {{"auto", std::nullopt}, {"unknown", NoDepth::unknown}, {"empty", NoDepth::empty}},
+        "What pixels without depth are: empty (nothing is there: seen past) or unknown (a "
+        "surface that the sensor missed). auto: as the depth says (infinity or 1e9 and more is "
+        "empty), else empty where a picture has transparent pixels or a mask, and unknown where "
+        "not");
     c.option(
          "--yuv",
          [o](const std::string& text) -> Result<void> {
@@ -532,20 +499,17 @@ void addSetFiles(Command& c, const std::shared_ptr<ConvertOptions>& o) {
              return {};
          },
          "Colour of YUV files (default bt709)")
-        .oneOf({"bt709", "bt601", "bt709-full", "bt601-full"})
-        .group(sets);
+        .oneOf({"bt709", "bt601", "bt709-full", "bt601-full"});
 }
 
 /// Cameras and units of sets that do not say them.
 void addSetCameras(Command& c, const std::shared_ptr<ConvertOptions>& o) {
-    const char* sets = kSetHeading;
     const auto numbers = [&](const char* name, const char* type, const char* help,
                              const std::vector<double*>& to) {
         c.option(
              name, [name, to](const std::string& text) { return setTextOptions(name, text, to); },
              help)
-            .takes(type)
-            .group(sets);
+            .takes(type);
     };
     auto& set = o->open.set;
     numbers("--depth-range", "MIN,MAX",
@@ -555,8 +519,7 @@ void addSetCameras(Command& c, const std::shared_ptr<ConvertOptions>& o) {
     c.option("--depth-unit", set.depthUnit,
              "Scene units of one step of a film's depth, as in 0.001 for millimetres (default: as "
              "the cameras' file says), or of depth beside a photo")
-        .positive()
-        .group(sets);
+        .positive();
     numbers(
         "--intrinsics", "FX,FY,CX,CY",
         "Of TUM and 7-Scenes recordings that do not hold them: the colour camera's; of a photo: "
@@ -572,27 +535,20 @@ void addSetCameras(Command& c, const std::shared_ptr<ConvertOptions>& o) {
          },
          "Of the depth of TUM and 7-Scenes recordings, where a camera of its own took it (default: "
          "7-Scenes' known ones)")
-        .takes("FX,FY,CX,CY")
-        .group(sets);
+        .takes("FX,FY,CX,CY");
     c.option("--depth-to-colour", set.depthToColour,
              "Where that camera is: a text file with rows of R t, a point p of the depth camera "
              "being R p + t in the colour camera (x right, y down, z forward), or none: depth lies "
              "on the pixels of its picture (default: 7-Scenes' known one)")
-        .takes("FILE|none")
-        .group(sets);
-    c.option("--focal", set.focal, "Focal length of older Middlebury sets, pixels")
-        .positive()
-        .group(sets);
+        .takes("FILE|none");
+    c.option("--focal", set.focal, "Focal length of older Middlebury sets, pixels").positive();
     c.option("--baseline", set.baseline, "From the first to the last view of those sets")
-        .positive()
-        .group(sets);
+        .positive();
     c.option("--disparity-offset", set.disparityOffset,
-             "Added to their disparities (dmin of 2006; default 0)")
-        .group(sets);
+             "Added to their disparities (dmin of 2006; default 0)");
     c.option("--disparity-scale", set.disparityScale,
              "Stored value of one pixel of disparity (default 1)")
-        .positive()
-        .group(sets);
+        .positive();
 }
 
 }  // namespace
@@ -622,21 +578,22 @@ void addConvert(CommandLine& line, Program& program) {
     c.flag("--times-from-start", o->open.timesFromStart,
            "MPEG-4: startTime and stopTime that come with a later access unit count from the "
            "start, and not from that unit");
-    c.option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
-        .takes("IMAGE")
-        .group(MeshViewOptions::kHeading);
-    addCodingOptions(c, o);
+    c.under(MeshViewOptions::kHeading)
+        .option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
+        .takes("IMAGE");
+    addCodingOptions(c.under("Coding"), o);
     addEnvironmentOptions(
-        c, o->environment, "Environment: what is behind everything, infinitely far away",
+        c, o->environment,
         "Added to the bundle, in place of one that it has: an equirectangular picture, an OpenEXR "
         "file with envmap, a folder of six faces, or a scene with a Background; none: takes it "
         "away");
-    addBatchOptions(c, o);
-    addSetOptions(c, o);
-    addSetCameras(c, o);
-    addSetFiles(c, o);
-    addPhotoOptions(c, o->open.set.photo, kSetHeading);
-    addBehindOption(c, o->open.set.photo, kSetHeading);
+    addBatchOptions(c.under("Many inputs"), o);
+    Command sets = c.under(kSetHeading);
+    addSetOptions(sets, o);
+    addSetCameras(sets, o);
+    addSetFiles(sets, o);
+    addPhotoOptions(sets, o->open.set.photo);
+    addBehindOption(sets, o->open.set.photo);
     addImportRefining(c, o->refining, kSetHeading);
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);

@@ -223,9 +223,8 @@ Result<Extracted> extractFolder(const ExtractOptions& o, std::unique_ptr<Sequenc
     write.noClobber = program.common.noClobber;
     write.depth = o.depth;
     write.linearAsPng = o.colour == "png";
-    if (frames->timeline().moves() && o.time) {
-        STX_TRY(frames, someFrames(std::move(frames), {moment}));
-    }
+    if (frames->timeline().moves() && o.time)
+        STX_SET(frames, someFrames(std::move(frames), {moment}));
     const std::size_t count = frames->timeline().count();
     keepFreedMemory();  // of a view, for the next one
     ViewTally tally;
@@ -268,12 +267,11 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
             momentOf(o.time, frames->timeline(), wanted.points ? "points are" : nullptr, o.input,
                      program.job));
     Extracted out;
-    if (wanted.points) {
-        STX_TRY(out, (wanted.ending == ".ply" ? extractPly : extractPoints)(o, takes, *frames,
+    if (wanted.points)
+        STX_SET(out, (wanted.ending == ".ply" ? extractPly : extractPoints)(o, takes, *frames,
                                                                             moment, program));
-    } else {
-        STX_TRY(out, extractFolder(o, std::move(frames), moment, program));
-    }
+    else
+        STX_SET(out, extractFolder(o, std::move(frames), moment, program));
     const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} ({}) → {} ({}), {}, {}",

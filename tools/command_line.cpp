@@ -130,10 +130,6 @@ Error usageError(const CLI::App& app, const CLI::ParseError& error, int argc, ch
 
 }  // namespace
 
-Option& Option::group(const std::string& heading) {
-    option_->group(heading);
-    return *this;
-}
 Option& Option::takes(const std::string& what) {
     option_->type_name(what);
     return *this;
@@ -173,96 +169,80 @@ Option& Option::positive() {
     return *this;
 }
 
-namespace {
-
-/// Of an option that is given twice the last one counts.
-CLI::Option* lastCounts(CLI::Option* option) {
-    if (!option->get_positional()) option->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-    return option;
+Command Command::under(const std::string& heading) const {
+    Command command = *this;
+    command.heading_ = heading;
+    return command;
 }
 
-/// Positionals are names of inputs, or words among which - is none.
-CLI::Option* withStandardInput(CLI::Option* option) {
-    if (option->get_positional())
-        option->transform([](std::string text) { return inputNamed(std::move(text)); });
-    return option;
+/// `lastCounts`: of an option that is given twice.
+Option Command::added(CLI::Option* option, bool lastCounts) const {
+    if (!heading_.empty()) option->group(heading_);
+    if (lastCounts && !option->get_positional())
+        option->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    return Option(option);
 }
 
-}  // namespace
+template <class Value>
+requires(!std::invocable<Value&, const std::string&>) Option Command::option(
+    const std::string& names, Value& to, const std::string& help) {
+    constexpr bool kSeveral = std::is_same_v<Value, std::vector<std::string>>;
+    CLI::Option* option = app_->add_option(names, to, help);
+    // Positionals are names of inputs, or words among which - is none.
+    if constexpr (kSeveral || std::is_same_v<Value, std::string>)
+        if (option->get_positional())
+            option->transform([](std::string text) { return inputNamed(std::move(text)); });
+    return added(option, !kSeveral);
+}
+template Option Command::option(const std::string&, std::string&, const std::string&);
+template Option Command::option(const std::string&, std::vector<std::string>&, const std::string&);
+template Option Command::option(const std::string&, int&, const std::string&);
+template Option Command::option(const std::string&, double&, const std::string&);
+template Option Command::option(const std::string&, std::optional<int>&, const std::string&);
+template Option Command::option(const std::string&, std::optional<double>&, const std::string&);
 
-Option Command::option(const std::string& names, std::string& to, const std::string& help) {
-    return Option(lastCounts(withStandardInput(app_->add_option(names, to, help))));
-}
-Option Command::option(const std::string& names, std::vector<std::string>& to,
-                       const std::string& help) {
-    return Option(withStandardInput(app_->add_option(names, to, help)));
-}
-Option Command::option(const std::string& names, int& to, const std::string& help) {
-    return Option(lastCounts(app_->add_option(names, to, help)));
-}
-Option Command::option(const std::string& names, double& to, const std::string& help) {
-    return Option(lastCounts(app_->add_option(names, to, help)));
-}
-Option Command::option(const std::string& names, std::optional<int>& to, const std::string& help) {
-    return Option(lastCounts(app_->add_option(names, to, help)));
-}
-Option Command::option(const std::string& names, std::optional<double>& to,
-                       const std::string& help) {
-    return Option(lastCounts(app_->add_option(names, to, help)));
-}
 Option Command::option(const std::string& names,
                        std::function<Result<void>(const std::string&)> parse,
                        const std::string& help) {
-    return Option(lastCounts(app_->add_option_function<std::string>(
-        names,
-        [names, parse = std::move(parse)](const std::string& text) {
-            if (auto ok = parse(text); !ok) throw CLI::ValidationError(names, ok.error().message);
-        },
-        help)));
+    const auto take = [names, parse = std::move(parse)](const std::string& text) {
+        if (auto ok = parse(text); !ok) throw CLI::ValidationError(names, ok.error().message);
+    };
+    return added(app_->add_option_function<std::string>(names, take, help), true);
 }
 Option Command::flag(const std::string& names, bool& to, const std::string& help) {
-    return Option(app_->add_flag(names, to, help));
+    return added(app_->add_flag(names, to, help), false);
 }
 Option Command::flag(const std::string& names, int& count, const std::string& help) {
-    return Option(app_->add_flag(names, count, help));
+    return added(app_->add_flag(names, count, help), false);
 }
 
 void Command::sharedOptions(CommonOptions& to, unsigned which) {
-    const char* group = "Shared options";
-    option("--threads", to.threads, "Threads to use; 0 = all processors")
-        .range(0, 1024)
-        .group(group);
-    lastCounts(app_->add_option("--max-memory", to.maxMemoryMiB,
-                                "Refuse inputs that would need more memory, in MiB (default 4096)"))
-        ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 24))
-        ->group(group);
-    choice("--decoder-isolation", to.requireIsolation, {{"auto", false}, {"required", true}},
-           "Decode foreign files as shut in as this kernel can, or only where it filters system "
-           "calls (default auto)")
-        .group(group);
-    flag("--quiet,-q", to.quiet, "Say nothing but errors").group(group);
-    flag("-v,--verbose", to.verbose, "Say more").group(group);
+    Command c = under("Shared options");
+    c.option("--threads", to.threads, "Threads to use; 0 = all processors").range(0, 1024);
+    CLI::Option* memory =
+        app_->add_option("--max-memory", to.maxMemoryMiB,
+                         "Refuse inputs that would need more memory, in MiB (default 4096)");
+    c.added(memory->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 24)), true);
+    c.choice("--decoder-isolation", to.requireIsolation, {{"auto", false}, {"required", true}},
+             "Decode foreign files as shut in as this kernel can, or only where it filters system "
+             "calls (default auto)");
+    c.flag("--quiet,-q", to.quiet, "Say nothing but errors");
+    c.flag("-v,--verbose", to.verbose, "Say more");
     if (which & kOutput) {
-        flag("--no-clobber", to.noClobber, "Refuse to replace existing files").group(group);
-        flag("--no-mkdir", to.noMkdir, "Refuse to make folders of outputs that are not there")
-            .group(group);
-        option("--report", to.report, "Write what was done as JSON to this file")
-            .takes("FILE.json")
-            .group(group);
+        c.flag("--no-clobber", to.noClobber, "Refuse to replace existing files");
+        c.flag("--no-mkdir", to.noMkdir, "Refuse to make folders of outputs that are not there");
+        c.option("--report", to.report, "Write what was done as JSON to this file")
+            .takes("FILE.json");
     }
     if (which & kFormat)
-        option("--format", to.format, "text or json (default text)")
-            .oneOf({"text", "json"})
-            .group(group);
+        c.option("--format", to.format, "text or json (default text)").oneOf({"text", "json"});
     if (which & kOutside)
-        flag("--allow-outside", to.allowOutside,
-             "Let names inside the input reach files outside its folder")
-            .group(group);
+        c.flag("--allow-outside", to.allowOutside,
+               "Let names inside the input reach files outside its folder");
     if (which & kPictures)
-        choice("--damaged", to.keepDamaged, {{"error", false}, {"keep", true}},
-               "A damaged JPEG is an error, or is drawn as far as it goes, with a note (default "
-               "error)")
-            .group(group);
+        c.choice("--damaged", to.keepDamaged, {{"error", false}, {"keep", true}},
+                 "A damaged JPEG is an error, or is drawn as far as it goes, with a note (default "
+                 "error)");
 }
 
 void Command::objectOption(std::string& to) {

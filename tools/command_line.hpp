@@ -1,5 +1,6 @@
 #pragma once
 
+#include <concepts>
 #include <functional>
 #include <initializer_list>
 #include <memory>
@@ -29,8 +30,6 @@ class Option {
   public:
     explicit Option(CLI::Option* option) : option_(option) {}
 
-    /// The heading of the help that it is listed under.
-    Option& group(const std::string& heading);
     /// What it takes, for people: "WxH".
     Option& takes(const std::string& what);
     Option& required();
@@ -66,12 +65,13 @@ class Command {
 
     Command(CLI::App* app, Body& body) : app_(app), body_(&body) {}
 
-    Option option(const std::string& names, std::string& to, const std::string& help);
-    Option option(const std::string& names, std::vector<std::string>& to, const std::string& help);
-    Option option(const std::string& names, int& to, const std::string& help);
-    Option option(const std::string& names, double& to, const std::string& help);
-    Option option(const std::string& names, std::optional<int>& to, const std::string& help);
-    Option option(const std::string& names, std::optional<double>& to, const std::string& help);
+    /// The same command, whose further options the help lists under this heading.
+    [[nodiscard]] Command under(const std::string& heading) const;
+
+    /// `to` is a string, several, a number, or a number that may be left out.
+    template <class Value>
+    requires(!std::invocable<Value&, const std::string&>) Option
+        option(const std::string& names, Value& to, const std::string& help);
     /// A text that `parse` takes or refuses.
     Option option(const std::string& names, std::function<Result<void>(const std::string&)> parse,
                   const std::string& help);
@@ -111,8 +111,11 @@ class Command {
                                       const std::string& why) const;
 
   private:
+    Option added(CLI::Option* option, bool lastCounts) const;
+
     CLI::App* app_;
     Body* body_;
+    std::string heading_;  ///< empty: that of CLI11
 };
 
 /// An option as a row of a table.

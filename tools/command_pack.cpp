@@ -96,10 +96,9 @@ bool prunes(const PackOptions& o) {
 
 Result<PruneReport> pruneOne(Bundle& bundle, const PackOptions& o, const std::string& input,
                              Job& job) {
-    auto report = o.minPsnr > 0 ? pruneToQuality(bundle, o.pruning, o.minPsnr, job)
-                                : prune(bundle, o.pruning, job);
-    if (!report) return tl::unexpected(report.error().at(fmt::format("'{}'", input)));
-    return report;
+    return within(fmt::format("'{}'", input),
+                  o.minPsnr > 0 ? pruneToQuality(bundle, o.pruning, o.minPsnr, job)
+                                : prune(bundle, o.pruning, job));
 }
 
 AtlasSaveOptions saveOptions(const PackOptions& o, const Program& program) {
@@ -150,15 +149,15 @@ Result<int> packViews(const PackOptions& o, std::unique_ptr<ViewTable> views, Pa
                       Program& program) {
     if (pruned) settings.sourcePixels = pruned->report.sourcePixels;
     const AtlasSaveOptions save = saveOptions(o, program);
-    auto atlas = packForFile(*views, settings, o.output, save, program.job);
-    if (!atlas) return tl::unexpected(atlas.error().at(fmt::format("'{}'", o.input)));
+    STX_TRY(auto atlas, within(fmt::format("'{}'", o.input),
+                               packForFile(*views, settings, o.output, save, program.job)));
     views.reset();
     STX_CHECK(program.job.checkCancelled());
-    const std::string summary = summaryOf(*atlas);
+    const std::string summary = summaryOf(atlas);
     nlohmann::ordered_json report = {
         {"$schema", "pack-report.schema.json"}, {"input", o.input}, {"output", o.output}};
-    addReportOf(*atlas, 0, report);
-    STX_CHECK(writeAtlas(std::move(*atlas), o.output, program.job, save));
+    addReportOf(atlas, 0, report);
+    STX_CHECK(writeAtlas(std::move(atlas), o.output, program.job, save));
     const double seconds = watch.seconds();
     report["seconds"] = seconds;
     program.sayNotes();
@@ -186,10 +185,9 @@ Result<std::optional<PrunedTo>> pruneViews(const PackOptions& o, const std::stri
             STX_CHECK(checkGrid(*views, o.settings, job.limits));
         return pruningOf(o, *views, job);
     };
-    auto pruning = found();
-    if (!pruning) return tl::unexpected(pruning.error().at(fmt::format("'{}'", input)));
-    const PrunedTo pruned{pruning->report, o.minPsnr > 0};
-    views = prunedViews(std::move(views), std::move(*pruning));
+    STX_TRY(auto pruning, within(fmt::format("'{}'", input), found()));
+    const PrunedTo pruned{pruning.report, o.minPsnr > 0};
+    views = prunedViews(std::move(views), std::move(pruning));
     return pruned;
 }
 
@@ -236,8 +234,8 @@ Result<void> packPeriod(const PackOptions& o, Sequence& frames, std::size_t begi
             if (prunes(o)) {
                 STX_CHECK(pruneOne(pruned, o, o.input, program.job));
             }
-            if (auto added = period->add(whole, pruned); !added)
-                return tl::unexpected(added.error().at(fmt::format("'{}': frame {}", o.input, i)));
+            STX_CHECK(
+                within(fmt::format("'{}': frame {}", o.input, i), period->add(whole, pruned)));
         }
     }
     for (std::size_t i = begin; i < end; ++i) {
@@ -373,9 +371,7 @@ Result<int> packInput(const PackOptions& options, Program& program) {
     STX_CHECK(setSize(o.size, program.job.limits, o.settings));
     STX_CHECK(checkTime(o.time));
     STX_CHECK(checkTarget(o.output, program));
-    if (!o.budget.empty()) {
-        STX_TRY(o.pruning.budget, parsePixels(o.budget));
-    }
+    if (!o.budget.empty()) STX_SET(o.pruning.budget, parsePixels(o.budget));
     STX_TRY(o.inputs, expandInputs(options.inputs, program.job.limits));
     if (o.inputs.size() > 1 || !o.names.empty()) return packSheet(o, program);
     o.input = o.inputs.front();
@@ -459,19 +455,18 @@ void addPack(CommandLine& line, Program& program) {
         .oneOf({"png", "jpeg"});
     c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100);
     refineOption(c, o->refine);
-    const char* pruning = "Pruning";
-    c.flag("--prune", o->prune, "Leave out pixels that another kept view shows as well or better")
-        .group(pruning);
-    c.option("--budget", o->budget, "Keep at most so many object pixels, as in 4M")
-        .takes("PIXELS")
-        .group(pruning);
-    c.option(
-         "--min-psnr", o->minPsnr,
-         "Prune only as far as pictures of what is kept reach this against pictures of all: RGB, "
-         "the worst of up to 12, rendered from poses of the views and half way between them")
+    Command pruning = c.under("Pruning");
+    pruning.flag("--prune", o->prune,
+                 "Leave out pixels that another kept view shows as well or better");
+    pruning.option("--budget", o->budget, "Keep at most so many object pixels, as in 4M")
+        .takes("PIXELS");
+    pruning
+        .option("--min-psnr", o->minPsnr,
+                "Prune only as far as pictures of what is kept reach this against pictures of all: "
+                "RGB, "
+                "the worst of up to 12, rendered from poses of the views and half way between them")
         .takes("DB")
-        .range(0.0, 200.0)
-        .group(pruning);
+        .range(0.0, 200.0);
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o](Program& p) { return packInput(*o, p); });

@@ -137,9 +137,7 @@ Result<int> makePanorama(const PanoramaOptions& options, const Command& command,
     STX_TRY(auto found, alignPanorama(*source, o.settings, program.job));
     STX_TRY(auto panorama, composePanorama(*source, found, compose, program.job));
     std::vector<LeftOutPicture> leftOut;
-    if (o.leaveOneOut) {
-        STX_TRY(leftOut, leaveEachOut(*source, found, compose, program.job));
-    }
+    if (o.leaveOneOut) STX_SET(leftOut, leaveEachOut(*source, found, compose, program.job));
     PanoramaWriteOptions write;
     write.faceSize = o.faces;
     write.noClobber = program.common.noClobber;

@@ -152,8 +152,7 @@ Result<void> checkFrames(const RenderOptions& o, int count, Program& program) {
 
 /// The camera of a reference view, which may move, in a picture as large as `picture`.
 Camera ofView(const std::vector<Camera>& views, const RenderOptions& o, const Camera& picture) {
-    return inPicture(views[static_cast<std::size_t>(o.camera.view)],
-                     glm::ivec2(picture.width, picture.height));
+    return inPicture(views[o.camera.view], glm::ivec2(picture.width, picture.height));
 }
 
 /// The options of pictures all around: what a lens would say is refused.
@@ -211,8 +210,7 @@ std::optional<std::pair<int, int>> ownRate(const RenderOptions& o, const DrawnSc
 Result<void> checkCameras(const std::vector<NovelCamera>& pictures, const Limits& limits) {
     for (std::size_t i = 0; i < pictures.size(); ++i) {
         const Camera& camera = pictures[i].camera;
-        if (auto ok = camera.check(); !ok)
-            return tl::unexpected(ok.error().at(fmt::format("camera {}", i)));
+        STX_CHECK(within(fmt::format("camera {}", i), camera.check()));
         STX_CHECK(limits.checkAllocation(static_cast<std::uint64_t>(camera.width) * camera.height,
                                          64, "the picture"));
     }
@@ -248,20 +246,21 @@ Result<Drawn> drawPictures(const RenderOptions& o, DrawnScene& scene,
         const bool more = !o.skipExisting && i + 1 < part.end;
         Camera camera = pictures[i].camera;
         if (scene.moving) {
-            auto now = scene.moving->at(*pictures[i].time,
-                                        more ? pictures[i + 1].time : std::optional<double>());
-            if (!now) return tl::unexpected(now.error().at(fmt::format("picture {}", i)));
-            drawn.renderer = *now;
+            STX_TRY(auto now,
+                    within(fmt::format("picture {}", i),
+                           scene.moving->at(*pictures[i].time, more ? pictures[i + 1].time
+                                                                    : std::optional<double>())));
+            drawn.renderer = now;
             if (o.camera.view >= 0 && !(o.camera.swayPercent > 0))
                 camera = ofView(scene.moving->views(), o, camera);
         } else if (more && !o.around) {
             drawn.renderer->expect(pictures[i + 1].camera);
         }
         const Stopwatch watch;
-        auto frame = o.around ? renderAround(*drawn.renderer, camera, camera.width, camera.height,
-                                             program.job)
-                              : drawn.renderer->render(camera);
-        if (!frame) return tl::unexpected(frame.error().at(fmt::format("picture {}", i)));
+        STX_TRY(auto frame, within(fmt::format("picture {}", i),
+                                   o.around ? renderAround(*drawn.renderer, camera, camera.width,
+                                                           camera.height, program.job)
+                                            : drawn.renderer->render(camera)));
         const double milliseconds = watch.milliseconds();
         drawn.milliseconds += milliseconds;
         ++drawn.count;
@@ -270,12 +269,12 @@ Result<Drawn> drawPictures(const RenderOptions& o, DrawnScene& scene,
         if (o.shard.given) drawn.views.back()["index"] = i;
         const bool nothing =
             scene.environment
-                ? std::ranges::none_of(frame->depth.pixels(), [](float d) { return hasPoint(d); })
-                : std::ranges::all_of(frame->colour.pixels(),
+                ? std::ranges::none_of(frame.depth.pixels(), [](float d) { return hasPoint(d); })
+                : std::ranges::all_of(frame.colour.pixels(),
                                       [](glm::vec4 c) { return !(c.a > 0); });
         if (nothing) ++drawn.empty;
-        STX_CHECK(writer.write(static_cast<int>(i), *frame, camera));
-        drawn.renderer->reuse(std::move(*frame));
+        STX_CHECK(writer.write(static_cast<int>(i), frame, camera));
+        drawn.renderer->reuse(std::move(frame));
         program.job.progress(static_cast<std::int64_t>(i - part.first) + 1,
                              static_cast<std::int64_t>(part.end - part.first), "rendering");
     }
@@ -325,9 +324,7 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     o.open = o.open.into(o.fileFormat == "exr" ? "stream.exr" : o.output);
     preloadCodecs(o.input);
     STX_TRY(const auto around, environmentOf(o.environment, program.job));
-    if (around) {
-        STX_TRY(settings.environment, EnvironmentMap::make(*around, program.job.limits));
-    }
+    if (around) STX_SET(settings.environment, EnvironmentMap::make(*around, program.job.limits));
     STX_TRY(auto scene, openScene(o, settings, command, program));
     std::size_t at = 0;
     for (const std::string& light : o.lights) {
@@ -365,123 +362,96 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     return 0;
 }
 
-void addDrawing(Command& c, RenderOptions& o) {
-    const char* drawing = "Drawing";
+void addDrawing(Command c, RenderOptions& o) {
     c.choice<Backend>("--backend", o.backend,
                       {{"auto", Backend::automatic},
                        {"gpu", Backend::gpu},
                        {"gl", Backend::gl},
                        {"cpu", Backend::cpu}},
-                      "auto, gpu, gl or cpu (default auto: a real GPU, else cpu)")
-        .group(drawing);
-    c.option("--device", o.device, "Number of the GPU to use, see --list-devices").group(drawing);
-    c.flag("--list-devices", o.listDevices, "Print the GPUs there are and stop").group(drawing);
+                      "auto, gpu, gl or cpu (default auto: a real GPU, else cpu)");
+    c.option("--device", o.device, "Number of the GPU to use, see --list-devices");
+    c.flag("--list-devices", o.listDevices, "Print the GPUs there are and stop");
     c.choice<GpuPipeline>(
-         "--pipeline", o.settings.pipeline,
-         {{"auto", GpuPipeline::automatic},
-          {"compute", GpuPipeline::compute},
-          {"raster", GpuPipeline::raster}},
-         "Of splats on a GPU: auto, compute (atomics; OpenGL 4.5) or raster (vertex texture "
-         "fetch; OpenGL 3.3) (default auto: by what the device has)")
-        .group(drawing);
+        "--pipeline", o.settings.pipeline,
+        {{"auto", GpuPipeline::automatic},
+         {"compute", GpuPipeline::compute},
+         {"raster", GpuPipeline::raster}},
+        "Of splats on a GPU: auto, compute (atomics; OpenGL 4.5) or raster (vertex texture "
+        "fetch; OpenGL 3.3) (default auto: by what the device has)");
     c.choice<RenderMode>("--mode", o.settings.mode,
                          {{"surface", RenderMode::surface}, {"splat", RenderMode::splat}},
-                         "surface: best pictures; splat: the paper's (default surface)")
-        .group(drawing);
+                         "surface: best pictures; splat: the paper's (default surface)");
     c.choice<Quality>(
-         "--quality", o.settings.quality,
-         {{"normal", Quality::normal}, {"best", Quality::best}, {"draft", Quality::normal}},
-         "Of surface mode: normal or best (default normal); draft is an older name of normal")
-        .group(drawing);
+        "--quality", o.settings.quality,
+        {{"normal", Quality::normal}, {"best", Quality::best}, {"draft", Quality::normal}},
+        "Of surface mode: normal or best (default normal); draft is an older name of normal");
     c.choice<SplatRule>(
-         "--splat", o.settings.splat,
-         {{"data", SplatRule::data}, {"paper", SplatRule::paper}, {"point", SplatRule::point}},
-         "Size and shape of splats: data, paper or point (default data)")
-        .group(drawing);
+        "--splat", o.settings.splat,
+        {{"data", SplatRule::data}, {"paper", SplatRule::paper}, {"point", SplatRule::point}},
+        "Size and shape of splats: data, paper or point (default data)");
     c.option("--splat-coefficient", o.settings.splatCoefficient,
              "Of --splat paper: pixels times scene units (default: fitted)")
-        .notNegative()
-        .group(drawing);
+        .notNegative();
     c.choice<Fill>("--fill", o.settings.fill,
                    {{"background", Fill::background}, {"none", Fill::none}},
                    "What no view shows: background (--background temporal) or none (default "
-                   "background)")
-        .group(drawing);
+                   "background)");
     c.choice<bool>("--match-colours", o.matchColours, {{"auto", true}, {"off", false}},
                    "Gains and offsets between views that differ clearly where they show the same "
                    "surface (exposure, white balance): auto brings them to those of most, off "
-                   "leaves them (default auto)")
-        .group(drawing);
-    refineOption(c, o.refine).group(drawing);
+                   "leaves them (default auto)");
+    refineOption(c, o.refine);
     c.option(
          "--without", o.without,
          "Leave out stages, with commas between them: " + stageNames() + ", and those of --refine")
-        .takes("STAGES")
-        .group(drawing);
+        .takes("STAGES");
     c.flag("--explain", o.explain,
-           "Print what each stage takes and how many pixels it changes (in the report, too)")
-        .group(drawing);
+           "Print what each stage takes and how many pixels it changes (in the report, too)");
     c.option("--background", o.background,
              "What stands where no view shows a surface. temporal: the bundle's background views, "
              "then what is around, in scenes that fill the frame (default); spatial: what is "
              "around only; none: nothing, alpha is kept. Or a colour behind all of it: values of 0 "
              "to 1, #rrggbb or a name such as white")
-        .takes("temporal|spatial|none|COLOUR")
-        .group(drawing);
+        .takes("temporal|spatial|none|COLOUR");
     addEnvironmentOptions(
-        c, o.environment, "Environment: what is behind everything, infinitely far away",
+        c, o.environment,
         "Shown where nothing covers a pixel: an equirectangular picture, an OpenEXR file with "
         "envmap, a folder of six faces, or a scene with a Background; none: not even the scene's "
         "own, which is shown otherwise (but with --background spatial, none or a colour)");
 }
 
-void addLighting(Command& c, RenderOptions& o) {
-    const char* lighting = "Lighting (Phong, in linear light; off without --light)";
+void addLighting(Command c, RenderOptions& o) {
     c.option("--light", o.lights,
              "dir:X,Y,Z[,r,g,b] shines along X,Y,Z; point:X,Y,Z[,r,g,b] is at X,Y,Z; @camera "
              "appended: in camera space; environment: diffuse and glossy light from all around, of "
              "--environment or the scene's own. Repeat for more")
-        .takes("LIGHT")
-        .group(lighting);
+        .takes("LIGHT");
     c.option("--ambient", o.ambient,
-             "Ambient light, grey or r,g,b (default 0.2; 0 with --light environment)")
-        .group(lighting);
-    c.option("--specular", o.specular, "Specular reflection, grey or r,g,b (default 0)")
-        .group(lighting);
-    c.option("--shininess", o.shininess, "Phong exponent, above 0 (default 32)")
-        .positive()
-        .group(lighting);
+             "Ambient light, grey or r,g,b (default 0.2; 0 with --light environment)");
+    c.option("--specular", o.specular, "Specular reflection, grey or r,g,b (default 0)");
+    c.option("--shininess", o.shininess, "Phong exponent, above 0 (default 32)").positive();
 }
 
-void addOutput(Command& c, RenderOptions& o) {
-    const char* output = "Output";
+void addOutput(Command c, RenderOptions& o) {
     c.option("--file-format", o.fileFormat,
              "Of what goes to stdout, -o -: y4m (a film), png or exr (one picture)")
-        .oneOf({"y4m", "png", "exr"})
-        .group(output);
-    c.option("--format", o.fileFormat, "The same as --file-format")
-        .oneOf({"y4m", "png", "exr"})
-        .group(output);
+        .oneOf({"y4m", "png", "exr"});
+    c.option("--format", o.fileFormat, "The same as --file-format").oneOf({"y4m", "png", "exr"});
     c.option("--compression", o.compression,
              "Of .png, 0 to 9: 1 takes least time, 9 makes files a tenth smaller (default 1)")
-        .range(0, 9)
-        .group(output);
+        .range(0, 9);
     c.option(
          "--fps", o.framesPerSecond,
          "Frame rate written into the stream, as in 30 or 30000/1001 (default: of --times all the "
          "input's, of --times cameras theirs, else 25)")
-        .takes("RATE")
-        .group(output);
-    c.flag("--skip-existing", o.skipExisting, "Leave pictures that exist as they are")
-        .group(output);
-    addShardOption(c, o.shard, "pictures", output);
+        .takes("RATE");
+    c.flag("--skip-existing", o.skipExisting, "Leave pictures that exist as they are");
+    addShardOption(c, o.shard, "pictures");
     c.flag("--times-from-start", o.open.timesFromStart,
            "MPEG-4: startTime and stopTime that come with a later access unit count from the "
-           "start, and not from that unit")
-        .group(output);
+           "start, and not from that unit");
     c.option("--texture", o.open.texture, "Texture of a mesh, in place of those that it names")
-        .takes("IMAGE")
-        .group(output);
+        .takes("IMAGE");
 }
 
 }  // namespace
@@ -500,26 +470,25 @@ void addRender(CommandLine& line, Program& program) {
              ".png, .jpg, .exr, .tif or .webp; name_%04d.png for several; - for a y4m stream")
         .takes("IMAGE");
     addCameraOptions(c, o->camera);
-    c.choice<bool>("--projection", o->around, {{"perspective", false}, {"equirectangular", true}},
-                   "equirectangular: all that is seen from the camera's place, 360 by 180 degrees, "
-                   "what it looks at in the middle (1024x512 by default); in .exr Z is the length "
-                   "of the ray, and 'stx convert --from panorama' reads it back (default: as the "
-                   "camera is)")
-        .group("Camera");
-    c.option("--time", o->time.time,
-             "The moment of an input that moves, in seconds by its own clock, which stx info "
-             "tells (default: its first)")
-        .takes("T")
-        .group("Time");
-    c.option(
-         "--times", o->time.times,
-         "A picture for each frame from A to B seconds, or each STEP seconds between; all: each "
-         "frame; cameras: the times of the --cameras file. With several cameras: as many")
-        .takes("A:B[:STEP]|all|cameras")
-        .group("Time");
-    addDrawing(c, *o);
-    addLighting(c, *o);
-    addOutput(c, *o);
+    c.under("Camera").choice<bool>(
+        "--projection", o->around, {{"perspective", false}, {"equirectangular", true}},
+        "equirectangular: all that is seen from the camera's place, 360 by 180 degrees, "
+        "what it looks at in the middle (1024x512 by default); in .exr Z is the length "
+        "of the ray, and 'stx convert --from panorama' reads it back (default: as the "
+        "camera is)");
+    Command time = c.under("Time");
+    time.option("--time", o->time.time,
+                "The moment of an input that moves, in seconds by its own clock, which stx info "
+                "tells (default: its first)")
+        .takes("T");
+    time.option(
+            "--times", o->time.times,
+            "A picture for each frame from A to B seconds, or each STEP seconds between; all: each "
+            "frame; cameras: the times of the --cameras file. With several cameras: as many")
+        .takes("A:B[:STEP]|all|cameras");
+    addDrawing(c.under("Drawing"), *o);
+    addLighting(c.under("Lighting (Phong, in linear light; off without --light)"), *o);
+    addOutput(c.under("Output"), *o);
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return render(*o, c, p); });

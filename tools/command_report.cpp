@@ -30,9 +30,7 @@ Result<int> report(const ReportOptions& o, Program& program) {
     for (const auto& target : {o.output, o.missing, o.outputs})
         if (!target.empty()) STX_CHECK(checkTarget(target, program));
     std::vector<std::string> names;
-    if (!o.inputs.empty()) {
-        STX_TRY(names, expandInputs(o.inputs, program.job.limits));
-    }
+    if (!o.inputs.empty()) STX_SET(names, expandInputs(o.inputs, program.job.limits));
     if (!o.missing.empty() && names.empty())
         return fail(ErrorCode::usage,
                     "--missing needs the names of all inputs; give --inputs "
@@ -41,8 +39,8 @@ Result<int> report(const ReportOptions& o, Program& program) {
     for (const auto& file : o.files) {
         STX_CHECK(program.job.checkCancelled());
         STX_TRY(const auto bytes, readFile(file, program.job.limits));
-        const auto added = merged.add({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-        if (!added) return tl::unexpected(added.error().at(fmt::format("'{}'", file)));
+        STX_CHECK(within(fmt::format("'{}'", file),
+                         merged.add({reinterpret_cast<const char*>(bytes.data()), bytes.size()})));
     }
     if (merged.total() == 0)
         return fail(ErrorCode::invalidInput, "no report tells of an input or a picture");

@@ -37,24 +37,23 @@ Result<int> selectAroundMesh(const Mesh& mesh, const SelectOptions& o, const Com
     views.views = fmt::format("auto:{}", o.settings.count);
     views.plot = o.plot;
     Selection chosen;
-    auto bundle = captureMesh(mesh, views, program, &chosen);
-    if (!bundle) return tl::unexpected(bundle.error().at(fmt::format("'{}'", o.input)));
-    bundle->title = std::filesystem::path(o.input).stem().string();
+    STX_TRY(auto bundle,
+            within(fmt::format("'{}'", o.input), captureMesh(mesh, views, program, &chosen)));
+    bundle.title = std::filesystem::path(o.input).stem().string();
     SaveOptions save;
     save.noClobber = program.common.noClobber;
-    STX_CHECK(saveBundle(*bundle, o.output, save, program.job));
+    STX_CHECK(saveBundle(bundle, o.output, save, program.job));
     const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} → {}, {}, {}", std::filesystem::path(o.input).filename().string(),
-                            o.output, counted(bundle->views.size(), "view"),
-                            humanSeconds(seconds)));
-    std::vector<int> order(bundle->views.size());
+                            o.output, counted(bundle.views.size(), "view"), humanSeconds(seconds)));
+    std::vector<int> order(bundle.views.size());
     std::iota(order.begin(), order.end(), 0);
     STX_CHECK(program.writeReport({{"$schema", "select-report.schema.json"},
                                    {"input", o.input},
                                    {"output", o.output},
                                    {"views", order},
-                                   {"of", bundle->views.size()},
+                                   {"of", bundle.views.size()},
                                    {"quality", chosen.quality},
                                    {"certificate", chosen.certificate},
                                    {"coverage", chosen.coverage},
@@ -94,7 +93,7 @@ Result<Selection> selectInFront(const Bundle& bundle, const SelectSettings& sett
         (bundle.views[i].background ? behind : numbers).push_back(static_cast<int>(i));
     if (behind.empty() || numbers.empty()) return selectViews(bundle, settings, job);
     STX_TRY(auto selection, selectViews(keepViews(bundle, numbers), settings, job));
-    for (int& view : selection.views) view = numbers[static_cast<std::size_t>(view)];
+    for (int& view : selection.views) view = numbers[view];
     selection.views.insert(selection.views.end(), behind.begin(), behind.end());
     return selection;
 }
@@ -132,11 +131,10 @@ Result<int> select(const SelectOptions& o, const Command& command, Program& prog
         STX_TRY(bundle, momentWithMost(*frames, program.job));
     } else {
         STX_TRY(auto table, frames->views(0, program.job));
-        if (mayGoOneByOne(*table)) {
+        if (mayGoOneByOne(*table))
             oneByOne = std::move(table);
-        } else {
-            STX_TRY(bundle, wholeBundle(std::move(table), program.job));
-        }
+        else
+            STX_SET(bundle, wholeBundle(std::move(table), program.job));
     }
     const std::size_t of = oneByOne ? oneByOne->count() : bundle.views.size();
     STX_TRY(const Selection selection, oneByOne ? selectViews(*oneByOne, settings, program.job)

@@ -152,9 +152,7 @@ Result<int> sheet(const SheetOptions& options, Program& program) {
                     o.inputs.size());
     if (!o.output.ends_with(".png") && o.output != "-")
         return fail(ErrorCode::usage, "-o is '{}'; a sheet is a .png", o.output);
-    if (!o.size.empty()) {
-        STX_TRY(o.settings.mostSize, parseSize(o.size, program.job.limits));
-    }
+    if (!o.size.empty()) STX_SET(o.settings.mostSize, parseSize(o.size, program.job.limits));
     STX_CHECK(checkTarget(o.output, program));
     for (const auto& input : o.inputs) {
         preloadCodecs(input);

@@ -129,9 +129,9 @@ void addValidate(CommandLine& line, Program& program) {
              "comment");
     c.flag("--no-pixels", o->noPixels, "Look at headers only, decode no image");
     c.flag("--rules", o->rules, "Print the catalogue of rules and stop");
-    const char* many = "Many inputs";
-    addJobsOption(c, o->batch, many);
-    addShardOption(c, o->batch.shard, "inputs", many);
+    Command many = c.under("Many inputs");
+    addJobsOption(many, o->batch);
+    addShardOption(many, o->batch.shard, "inputs");
     c.sharedOptions(program.common, kOutput | kFormat | kOutside);
     c.runs([o](Program& p) { return run(*o, p); });
 }

@@ -29,9 +29,8 @@ Result<Bundle> viewsToDraw(
     if (inMemory > limit && inMemory > fromSpool) {
         STX_CHECK(checkPeak({kPreparing.what, 0}, pixels, 0, fromSpool, job.limits));
         STX_TRY(spool, FileSpool::create(folder, limit / kSpoolPart));
-    } else if (auto ok = job.limits.checkAllocation(images, 1, "the views"); !ok) {
-        return tl::unexpected(ok.error().at(table.where()));
-    }
+    } else
+        STX_CHECK(within(table.where(), job.limits.checkAllocation(images, 1, "the views")));
     return someViews(table, wanted, spool.get(), job, look);
 }
 

@@ -17,18 +17,16 @@ Result<glm::dvec3> upOf(const EnvironmentOptions& options) {
 
 }  // namespace
 
-void addEnvironmentOptions(Command c, EnvironmentOptions& options, const char* heading,
-                           const char* help) {
-    c.option("--environment", options.file, help).takes("FILE|none").group(heading);
+void addEnvironmentOptions(const Command& command, EnvironmentOptions& options, const char* help) {
+    Command c = command.under("Environment: what is behind everything, infinitely far away");
+    c.option("--environment", options.file, help).takes("FILE|none");
     c.option("--environment-up", options.up,
              "Direction of the scene that is up in the environment: Z, X,Y,Z or with a minus "
              "--environment-up=-Y (default Y)")
-        .takes("AXIS")
-        .group(heading);
+        .takes("AXIS");
     c.option("--environment-turn", options.turnDeg,
              "Turns the environment about that direction, counter-clockwise from above (default 0)")
-        .takes("DEG")
-        .group(heading);
+        .takes("DEG");
 }
 
 Result<void> checkEnvironmentOptions(const EnvironmentOptions& options, const Command& command) {

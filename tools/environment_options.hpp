@@ -20,8 +20,7 @@ struct EnvironmentOptions {
     [[nodiscard]] bool none() const { return file == "none"; }
 };
 
-void addEnvironmentOptions(Command command, EnvironmentOptions& options, const char* heading,
-                           const char* help);
+void addEnvironmentOptions(const Command& command, EnvironmentOptions& options, const char* help);
 
 /// Errors (usage) of options that need no file to be seen.
 [[nodiscard]] Result<void> checkEnvironmentOptions(const EnvironmentOptions& options,

@@ -29,9 +29,7 @@ Result<ConvertSettings> settingsOf(const MeshViewOptions& o, Program& program) {
                     o.fovDeg);
     s.fovRad = glm::radians(o.fovDeg);
     s.elevationRad = glm::radians(o.elevationDeg.value_or(15.0));
-    if (!o.up.empty()) {
-        STX_TRY(s.up, parseDirection(o.up, "--up"));
-    }
+    if (!o.up.empty()) STX_SET(s.up, parseDirection(o.up, "--up"));
     s.supersampling = o.supersampling;
     s.depthBits = o.depthBits;
     s.meshNormals = o.normals == "mesh";
@@ -48,9 +46,7 @@ Result<std::vector<NamedCamera>> camerasOfFile(const MeshViewOptions& o, const M
         !std::filesystem::exists(o.views, ec))
         return cameras;
     std::optional<glm::ivec2> size;
-    if (!o.size.empty()) {
-        STX_TRY(size, parseSize(o.size, program.job.limits));
-    }
+    if (!o.size.empty()) STX_SET(size, parseSize(o.size, program.job.limits));
     STX_TRY(cameras, readCameraFile(o.views, program.job, size));
     for (NamedCamera& named : cameras) {
         named.camera = inPicture(named.camera, size);
@@ -114,65 +110,44 @@ Result<ChosenViews> chooseMeshViews(const Mesh& mesh, const MeshViewOptions& o, 
 
 }  // namespace
 
-void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>& o) {
-    const char* group = MeshViewOptions::kHeading;
-    command
-        .option("--views", o->views,
-                "cube, ring:N, sphere:N, octahedral:N, hemi-octahedral:N (grids of N x N), auto:N "
-                "(the N best), auto:DBdB (the fewest that reach this PSNR) or a camera file "
-                "(default sphere:16)")
-        .group(group);
-    command
-        .option("--size", o->size,
-                "Size of each view (default 512x512; of a camera file: what it says)")
-        .takes("WxH")
-        .group(group);
-    command
-        .option("--projection", o->projection,
-                "perspective or orthographic (default perspective; cube: orthographic)")
-        .oneOf({"perspective", "orthographic"})
-        .group(group);
-    command
-        .option("--elevation", o->elevationDeg,
-                "Of a ring above the horizon, in degrees (default 15)")
+void addMeshViewOptions(const Command& command, const std::shared_ptr<MeshViewOptions>& o) {
+    Command c = command.under(MeshViewOptions::kHeading);
+    c.option("--views", o->views,
+             "cube, ring:N, sphere:N, octahedral:N, hemi-octahedral:N (grids of N x N), auto:N "
+             "(the N best), auto:DBdB (the fewest that reach this PSNR) or a camera file "
+             "(default sphere:16)");
+    c.option("--size", o->size,
+             "Size of each view (default 512x512; of a camera file: what it says)")
+        .takes("WxH");
+    c.option("--projection", o->projection,
+             "perspective or orthographic (default perspective; cube: orthographic)")
+        .oneOf({"perspective", "orthographic"});
+    c.option("--elevation", o->elevationDeg, "Of a ring above the horizon, in degrees (default 15)")
         .range(-90.0, 90.0)
-        .takes("DEG")
-        .group(group);
-    command
-        .option("--up", o->up,
-                "The model's up axis, on which rings, spheres and octahedra stand: Z, X,Y,Z or "
-                "with a minus --up=-Y (default Y; of Gaussian splats in PLY -Y, as in trained "
-                "clouds)")
-        .takes("AXIS")
-        .group(group);
-    command
-        .option(
-            "--fov", o->fovDeg,
-            "Angle that the whole object fills, in degrees: sets the distance (default 35); of a "
-            "photo: what its camera sees from bottom to top")
-        .takes("DEG")
-        .group(group);
-    command
-        .option("--supersampling", o->supersampling,
-                "Colour samples per pixel and axis, 1 to 8 (default 4)")
-        .range(1, 8)
-        .group(group);
-    command
-        .option("--normals", o->normals,
-                "mesh: keep the model's own normals (SimpleTextureV2); or none (default none)")
-        .oneOf({"mesh", "none"})
-        .group(group);
-    command
-        .flag("--materials", o->materials,
-              "Keep metallic-roughness (glTF) and the light that is given off as images of their "
-              "own, for engines (.exr; from there atlases); colour is then without that light")
-        .group(group);
-    command.option("--plot", o->plot, "With auto: draw quality against the number of views")
-        .takes("FILE.svg")
-        .group(group);
-    command.option("--depth-bits", o->depthBits, "8, 16 or 32 (float, .exr only); default 16")
-        .oneOf({8, 16, 32})
-        .group("Coding");
+        .takes("DEG");
+    c.option("--up", o->up,
+             "The model's up axis, on which rings, spheres and octahedra stand: Z, X,Y,Z or "
+             "with a minus --up=-Y (default Y; of Gaussian splats in PLY -Y, as in trained "
+             "clouds)")
+        .takes("AXIS");
+    c.option("--fov", o->fovDeg,
+             "Angle that the whole object fills, in degrees: sets the distance (default 35); of a "
+             "photo: what its camera sees from bottom to top")
+        .takes("DEG");
+    c.option("--supersampling", o->supersampling,
+             "Colour samples per pixel and axis, 1 to 8 (default 4)")
+        .range(1, 8);
+    c.option("--normals", o->normals,
+             "mesh: keep the model's own normals (SimpleTextureV2); or none (default none)")
+        .oneOf({"mesh", "none"});
+    c.flag("--materials", o->materials,
+           "Keep metallic-roughness (glTF) and the light that is given off as images of their "
+           "own, for engines (.exr; from there atlases); colour is then without that light");
+    c.option("--plot", o->plot, "With auto: draw quality against the number of views")
+        .takes("FILE.svg");
+    c.under("Coding")
+        .option("--depth-bits", o->depthBits, "8, 16 or 32 (float, .exr only); default 16")
+        .oneOf({8, 16, 32});
 }
 
 Result<void> checkMeshViewOptions(const MeshViewOptions& o, const Command& command,

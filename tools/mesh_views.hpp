@@ -30,7 +30,7 @@ struct MeshViewOptions {
     static constexpr const char* kHeading = "Views of a mesh";
 };
 
-void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>& options);
+void addMeshViewOptions(const Command& command, const std::shared_ptr<MeshViewOptions>& options);
 
 /// Errors (usage) that are found before a mesh is read.
 [[nodiscard]] Result<void> checkMeshViewOptions(const MeshViewOptions& options,

@@ -4,20 +4,16 @@
 
 namespace stx::tools {
 
-void addPhotoOptions(const Command& command, PhotoSetOptions& options, const char* heading) {
-    Command c = command;
+void addPhotoOptions(Command c, PhotoSetOptions& options) {
     c.choice<NearIs>("--depth-near", options.nearIs,
                      {{"white", NearIs::white}, {"black", NearIs::black}},
-                     "What is near in a grey picture of depth beside a photo: two customs exist")
-        .group(heading);
+                     "What is near in a grey picture of depth beside a photo: two customs exist");
     c.choice<bool>("--colour-of", options.portrait, {{"original", false}, {"portrait", true}},
                    "Of a photo that holds both: the sharp picture (original) or the one whose "
-                   "background is blurred (portrait)")
-        .group(heading);
+                   "background is blurred (portrait)");
 }
 
-void addBehindOption(const Command& command, PhotoSetOptions& options, const char* heading) {
-    Command c = command;
+void addBehindOption(Command c, PhotoSetOptions& options) {
     options.behindPercent = kUsualBehindPercent;
     c.option(
          "--behind",
@@ -35,8 +31,7 @@ void addBehindOption(const Command& command, PhotoSetOptions& options, const cha
          "Of a photo: how far to the side an eye may go without a hole, percent of the median "
          "distance; what the photo hides is invented for it, as a view of its own (default 8). "
          "none: only what was photographed")
-        .takes("PERCENT|none")
-        .group(heading);
+        .takes("PERCENT|none");
 }
 
 }  // namespace stx::tools

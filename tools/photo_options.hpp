@@ -5,9 +5,9 @@
 
 namespace stx::tools {
 
-/// --depth-near and --colour-of, under a heading of the help.
-void addPhotoOptions(const Command& command, PhotoSetOptions& options, const char* heading);
+/// --depth-near and --colour-of.
+void addPhotoOptions(Command command, PhotoSetOptions& options);
 /// --behind, of what is written and not only looked at: without it what is hidden is invented.
-void addBehindOption(const Command& command, PhotoSetOptions& options, const char* heading);
+void addBehindOption(Command command, PhotoSetOptions& options);
 
 }  // namespace stx::tools

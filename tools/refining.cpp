@@ -270,37 +270,29 @@ Result<std::unique_ptr<ViewTable>> ImportRefining::refined(std::unique_ptr<ViewT
     return refinedViews(std::move(table), settings, refine, false, folder, job);
 }
 
-void addImportRefining(Command& command, ImportRefining& refining, const char* sets) {
-    command
-        .option("--refine", refining.steps,
-                "Steps of refining (see stx refine): auto (what image sets of a kind are known to "
-                "need), off, these only, or auto,STEP,-STEP (this one, too, and not that one)")
+void addImportRefining(Command c, ImportRefining& refining, const char* heading) {
+    c.option("--refine", refining.steps,
+             "Steps of refining (see stx refine): auto (what image sets of a kind are known to "
+             "need), off, these only, or auto,STEP,-STEP (this one, too, and not that one)")
         .takes("auto|off|STEPS");
+    c = c.under(heading);
     const auto step = [&](const char* name, RefineStep of, const char* on, const char* off,
                           const char* help) {
-        command
-            .choice<RefineSwitch>(
-                name, refining.switches[static_cast<std::size_t>(of)],
-                {{"auto", RefineSwitch::automatic},
-                 {on, RefineSwitch::on},
-                 {off, RefineSwitch::off}},
-                std::string(help) + "; the step " + std::string(infoOf(of).name) + " of --refine")
-            .group(sets);
+        c.choice<RefineSwitch>(
+            name, refining.switches[static_cast<std::size_t>(of)],
+            {{"auto", RefineSwitch::automatic}, {on, RefineSwitch::on}, {off, RefineSwitch::off}},
+            std::string(help) + "; the step " + std::string(infoOf(of).name) + " of --refine");
     };
     step("--mixed-pixels", RefineStep::mixed, "drop", "keep",
          "Flying points at depth edges: auto (dropped from sensors' depth), drop, keep");
-    command
-        .choice<RefineSwitch>(
-            "--view-size", refining.switches[static_cast<std::size_t>(RefineStep::raise)],
-            {{"picture", RefineSwitch::on}, {"depth", RefineSwitch::off}},
-            "Of views whose depth is smaller than their picture: picture (the depth is raised "
-            "along the picture's edges) or depth (default picture); the step raise of --refine")
-        .group(sets);
-    command
-        .flag("--refine-poses", refining.poses,
-              "Move the cameras so that overlapping views agree in depth and colour; the step "
-              "poses of --refine")
-        .group(sets);
+    c.choice<RefineSwitch>(
+        "--view-size", refining.switches[static_cast<std::size_t>(RefineStep::raise)],
+        {{"picture", RefineSwitch::on}, {"depth", RefineSwitch::off}},
+        "Of views whose depth is smaller than their picture: picture (the depth is raised "
+        "along the picture's edges) or depth (default picture); the step raise of --refine");
+    c.flag("--refine-poses", refining.poses,
+           "Move the cameras so that overlapping views agree in depth and colour; the step "
+           "poses of --refine");
     step("--dequantise", RefineStep::steps, "on", "off",
          "Smooth the stairs of depth stored in integers, within half a step: auto (8-bit "
          "depth), on, off");

@@ -112,8 +112,8 @@ struct ImportRefining {
                                                              Job& job) const;
 };
 
-/// --refine, and the options of single steps under the heading of image sets. `refining` must
+/// --refine, and the options of single steps under that heading. `refining` must
 /// outlive the command.
-void addImportRefining(Command& command, ImportRefining& refining, const char* sets);
+void addImportRefining(Command command, ImportRefining& refining, const char* heading);
 
 }  // namespace stx::tools

@@ -126,9 +126,7 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
     const bool sways = o.camera.swayPercent > 0;
     if (o.time.any()) {
         STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
-        if (sways) {
-            STX_TRY(scene.context.sway, swayPose(o, *frames, program.job));
-        }
+        if (sways) STX_SET(scene.context.sway, swayPose(o, *frames, program.job));
         scene.moving = std::make_unique<MovingPictures>(
             std::move(frames), settings, o.backend, o.device, folderBeside(o.output), program.job);
         if (lightsByEnvironment(o)) scene.moving->lightByEnvironment();
@@ -149,9 +147,7 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
             if (!v.background) scene.context.moved.push_back(MovedCamera::of(v));
         scene.points = scene.table ? pointsOf(scene.summaries) : seen.pointCount();
         scene.environment = settings.ownEnvironment && seen.environment;
-        if (sways) {
-            STX_TRY(scene.context.sway, swayPose(o.camera, seen));
-        }
+        if (sways) STX_SET(scene.context.sway, swayPose(o.camera, seen));
         return {};
     };
     if (const auto* mesh = std::get_if<Mesh>(&scene.model)) {
@@ -200,13 +196,12 @@ Result<void> makeStill(const RenderOptions& o, const RenderSettings& asked,
             return {};
         }
     }
-    if (scene.spool) {
-        STX_TRY(scene.still, makeRenderer(o.backend, std::get<Bundle>(scene.model), *scene.spool,
+    if (scene.spool)
+        STX_SET(scene.still, makeRenderer(o.backend, std::get<Bundle>(scene.model), *scene.spool,
                                           settings, o.device, job));
-    } else {
-        STX_TRY(scene.still,
+    else
+        STX_SET(scene.still,
                 rendererOf(std::move(scene.model), settings, job, o.backend, o.device));
-    }
     return {};
 }
 

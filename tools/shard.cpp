@@ -32,15 +32,13 @@ Shard::Range Shard::rangeOf(std::size_t length) const {
             static_cast<std::size_t>(length * k / n)};
 }
 
-void addShardOption(Command command, Shard& shard, const char* what, const char* heading) {
-    command
-        .option(
-            "--shard", [&shard](const std::string& text) { return parseShard(text, shard); },
-            fmt::format("Only part K of N of the {}, from 1: for N runs that do all of it without "
-                        "speaking to each other; 'stx report merge' joins their reports",
-                        what))
-        .takes("K/N")
-        .group(heading);
+void addShardOption(Command c, Shard& shard, const char* what) {
+    c.option(
+         "--shard", [&shard](const std::string& text) { return parseShard(text, shard); },
+         fmt::format("Only part K of N of the {}, from 1: for N runs that do all of it without "
+                     "speaking to each other; 'stx report merge' joins their reports",
+                     what))
+        .takes("K/N");
 }
 
 nlohmann::ordered_json shardJson(const Shard& shard, std::size_t total) {

@@ -28,7 +28,7 @@ struct Shard {
 };
 
 /// Adds --shard K/N. `what`: "inputs".
-void addShardOption(Command command, Shard& shard, const char* what, const char* heading);
+void addShardOption(Command command, Shard& shard, const char* what);
 
 /// {"number": K, "count": N, "total": length}, for reports.
 [[nodiscard]] nlohmann::ordered_json shardJson(const Shard& shard, std::size_t total);

@@ -22,12 +22,11 @@ Result<std::unique_ptr<ViewTable>> cubeOf(std::unique_ptr<ViewTable> table,
                                           const std::filesystem::path& folder, Job& job) {
     std::unique_ptr<FileSpool> spool;  // outlives the bundle
     Bundle bundle;
-    if (table->whole()) {
-        STX_TRY(bundle, wholeBundle(std::move(table), job));
-    } else {
-        STX_TRY(bundle, viewsToDraw(*table, drawingMemory({}),
+    if (table->whole())
+        STX_SET(bundle, wholeBundle(std::move(table), job));
+    else
+        STX_SET(bundle, viewsToDraw(*table, drawingMemory({}),
                                     std::vector<bool>(table->count(), true), folder, spool, job));
-    }
     STX_TRY(auto cube, cubeFromInside(bundle, job, spool.get()));
     return tableOf(std::move(cube));
 }

@@ -126,12 +126,10 @@ class ChangedOnce : public Sequence {
         for (std::size_t k = 0; k < bundle.views.size(); ++k) {
             ReferenceView& view = bundle.views[k];
             KeptView v{view, {}, {}};
-            if (const Pixels depth = pixelsOf(view.depth); hashOf(depth) != before[2 * k]) {
-                STX_TRY(v.depth, file_.add(depth));
-            }
-            if (const Pixels colour = pixelsOf(view.texture); hashOf(colour) != before[2 * k + 1]) {
-                STX_TRY(v.texture, file_.add(colour));
-            }
+            if (const Pixels depth = pixelsOf(view.depth); hashOf(depth) != before[2 * k])
+                STX_SET(v.depth, file_.add(depth));
+            if (const Pixels colour = pixelsOf(view.texture); hashOf(colour) != before[2 * k + 1])
+                STX_SET(v.texture, file_.add(colour));
             kept.views.push_back(std::move(v));
         }
         return kept;

@@ -165,11 +165,10 @@ Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
     STX_TRY(const auto reader, ExrReader::open(path, job.limits));
     const int at = environmentPartOf(reader);
     if (at >= 0 && exrViewParts(reader).empty()) {
-        auto e = environmentHeader(reader.parts()[static_cast<std::size_t>(at)]);
-        if (!e) return tl::unexpected(e.error().at(reader.where()));
+        STX_TRY(auto e, within(reader.where(), environmentHeader(reader.parts()[at])));
         out["container"] = "exr";
         out["views"] = Json::array();
-        out["environment"] = environmentJson(e->environment, e->size, e->faces);
+        out["environment"] = environmentJson(e.environment, e.size, e.faces);
         return {};
     }
     STX_TRY(auto header, readExrBundleHeader(reader));
@@ -342,13 +341,12 @@ Result<void> describeAtlas(const fs::path& path, const std::string& object, Json
     const bool folder = !header.environmentFile.empty();
     if (!folder && out["container"] != "atlas-exr") return {};
     fs::path file = path;
-    if (folder) {
-        STX_TRY(file, resolveInside(fs::is_directory(path) ? path : folderOf(path),
+    if (folder)
+        STX_SET(file, resolveInside(fs::is_directory(path) ? path : folderOf(path),
                                     header.environmentFile, job.limits));
-    }
     STX_TRY(const auto reader, ExrReader::open(file, job.limits));
     if (const int at = environmentPartOf(reader); at >= 0) {
-        STX_TRY(const auto e, environmentHeader(reader.parts()[static_cast<std::size_t>(at)]));
+        STX_TRY(const auto e, environmentHeader(reader.parts()[at]));
         out["environment"] = environmentJson(e.environment, e.size, e.faces);
     }
     return {};
@@ -459,20 +457,18 @@ Result<void> addMeasured(const fs::path& path, FileKind kind, const InfoOptions&
         STX_TRY(const auto table, openViews(path, open, job));
         if (bounds) STX_CHECK(addFromPixels(out, *table, job));
         // An import names views that are off by itself.
-        if (options.agreement) {
-            STX_TRY(out["agreement"], agreementJson(*table, out["container"] != "imageset", job));
-        }
+        if (options.agreement)
+            STX_SET(out["agreement"], agreementJson(*table, out["container"] != "imageset", job));
     }
     if (options.memory) {
-        auto memory = [&]() -> Result<Json> {
+        const auto memory = [&]() -> Result<Json> {
             const bool onDemand = kind == FileKind::mpeg4 || out["container"] == "exr";
             if (kind == FileKind::imageSet) return memoryOfSet(path, job);
             if (!onDemand) return memoryOfSizes(out["views"], false, job.limits);
             STX_TRY(const auto table, openViews(path, open, job));
             return memoryJson(*table, job);
-        }();
-        if (!memory) return tl::unexpected(memory.error().at(fmt::format("'{}'", path.string())));
-        out["memory"] = *std::move(memory);
+        };
+        STX_TRY(out["memory"], within(fmt::format("'{}'", path.string()), memory()));
     }
     return {};
 }

@@ -34,8 +34,7 @@ Result<nlohmann::ordered_json> agreementJson(const ViewTable& table, bool notes,
         view["disagreement"] = of.relative;
         view["oneSurface"] = of.oneSurface;
         view["disagrees"] = of.disagrees();
-        view["most"] = {{"view", bundle.views[static_cast<std::size_t>(of.farthest)].name},
-                        {"disagreement", of.farthestBy}};
+        view["most"] = {{"view", bundle.views[of.farthest].name}, {"disagreement", of.farthestBy}};
     }
     if (const auto note = disagreementNote(bundle, found, posesWereAligned(bundle)); note && notes)
         job.note(*note);

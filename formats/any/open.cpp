@@ -176,9 +176,7 @@ Result<void> checkObject(const fs::path& path, FileKind kind, const OpenOptions&
 
 Result<Atlas> openAtlas(const fs::path& path, const OpenOptions& options, Job& job) {
     STX_TRY(auto atlas, readAtlas(path, job));
-    auto object = objectOf(std::move(atlas), options.object);
-    if (!object) return tl::unexpected(object.error().at(fmt::format("'{}'", path.string())));
-    return object;
+    return within(fmt::format("'{}'", path.string()), objectOf(std::move(atlas), options.object));
 }
 
 Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const OpenOptions& options,

@@ -172,8 +172,7 @@ Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> all,
     else if (line.moves())
         line.end += line.times.back() - line.times[line.count() - 2];
     line.findTick();
-    if (const auto sound = line.check(); !sound)
-        return tl::unexpected(sound.error().at(fmt::format("'{}'", pattern.string())));
+    STX_CHECK(within(fmt::format("'{}'", pattern.string()), line.check()));
     return std::make_unique<NumberedSequence>(std::move(files), film.atlases, std::move(line),
                                               options.object);
 }
@@ -195,10 +194,8 @@ Result<std::unique_ptr<Sequence>> openFrames(const fs::path& path, const OpenOpt
         read.folder = folderOf(path);
         read.timesFromStart = options.timesFromStart;
         read.keepColourFiles = options.keepColourFiles;
-        auto sequence = mpeg4::sequenceFromScene(std::move(document), read, job);
-        if (!sequence)
-            return tl::unexpected(sequence.error().at(fmt::format("'{}'", path.string())));
-        return sequence;
+        return within(fmt::format("'{}'", path.string()),
+                      mpeg4::sequenceFromScene(std::move(document), read, job));
     }
     STX_TRY(auto table, openViews(path, options, job));
     return std::make_unique<StillFile>(std::move(table), path, options);

@@ -9,7 +9,7 @@
 #include "formats/exr/environment_exr.hpp"
 #include "formats/exr/exr_colour.hpp"
 #include "formats/images/images.hpp"
-#include "lib/base/parallel.hpp"
+#include "lib/base/parallel_try.hpp"
 
 namespace stx {
 
@@ -164,21 +164,13 @@ Result<void> writeFolder(const Atlas& atlas, const fs::path& path, Job& job,
     const AtlasHeader header = headerOf(atlas, false, options.jpegQuality > 0);
     if (options.jpegQuality > 0) STX_CHECK(checkJpeg(header, path));
     STX_TRY(auto folder, OutputFolder::create(path, options.output, ownNames()));
-    const auto count = static_cast<std::int64_t>(header.textures.size());
-    std::vector<Result<void>> done(header.textures.size());
-    parallelFor(0, count, [&](std::int64_t i) {
+    STX_CHECK(parallelTry(0, header.textures.size(), [&](std::size_t i) -> Result<void> {
         const AtlasTexture& t = header.textures[i];
         const fs::path file = folder.temporaryPath() / t.file;
-        if (t.coding == "float") {
-            done[i] = writeFloatImage(header, atlas.pages[t.page], t, file);
-            return;
-        }
-        const auto bytes = encodeImage(atlas, t, options.jpegQuality, depthIsCoded, job);
-        done[i] = bytes ? writeFile(file, *bytes) : Result<void>(tl::unexpected(bytes.error()));
-    });
-    for (auto& result : done) {
-        if (!result) return propagate(result);
-    }
+        if (t.coding == "float") return writeFloatImage(header, atlas.pages[t.page], t, file);
+        STX_TRY(const auto bytes, encodeImage(atlas, t, options.jpegQuality, depthIsCoded, job));
+        return writeFile(file, bytes);
+    }));
     if (atlas.environment)
         STX_CHECK(writeEnvironmentExr(*atlas.environment, folder.temporaryPath() / kEnvironmentFile,
                                       job));
@@ -279,9 +271,7 @@ Result<void> readImage(const fs::path& file, const AtlasHeader& header, const At
         };
         if (bits == 8) fill(std::get<0>(image.values));
         if (bits == 16) fill(std::get<1>(image.values));
-        auto depth = depthFromCodes(header.atlas, t.page, codes);
-        if (!depth) return tl::unexpected(depth.error().at(where));
-        page.depth = std::move(*depth);
+        STX_TRY(page.depth, within(where, depthFromCodes(header.atlas, t.page, codes)));
         return {};
     }
     if (material) {
@@ -327,9 +317,7 @@ Result<void> checkMemory(const AtlasHeader& header, const std::string& where,
                 : t.attribute == "splat" ? 24
                                          : 12;
     const auto pixels = static_cast<std::uint64_t>(header.pageWidth) * header.pageHeight;
-    if (auto ok = limits.checkAllocation(pixels, each, "the atlas"); !ok)
-        return tl::unexpected(ok.error().at(where));
-    return {};
+    return within(where, limits.checkAllocation(pixels, each, "the atlas"));
 }
 
 fs::path setFolderOf(const fs::path& path) {
@@ -370,7 +358,7 @@ Result<AtlasHeader> folderHeader(const fs::path& path, const Limits& limits,
 }
 
 Result<Atlas> checked(Atlas atlas, const AtlasHeader& header, const std::string& where) {
-    if (auto ok = atlas.check(); !ok) return tl::unexpected(ok.error().at(where));
+    STX_CHECK(within(where, atlas.check()));
     for (const AtlasTexture& t : header.textures) {
         // Integer codes stand for distances only; floats may be anything.
         if (t.attribute != "depth" || t.coding != "float") continue;
@@ -388,17 +376,11 @@ Result<Atlas> readFolder(const fs::path& path, Job& job) {
     Atlas atlas = header.atlas;
     atlas.pages.resize(static_cast<std::size_t>(header.pages));
     std::vector<Image<std::uint8_t>> coverage(atlas.pages.size());
-    std::vector<Result<void>> done(header.textures.size());
-    parallelFor(0, static_cast<std::int64_t>(done.size()), [&](std::int64_t i) {
+    STX_CHECK(parallelTry(0, header.textures.size(), [&](std::size_t i) -> Result<void> {
         const AtlasTexture& t = header.textures[i];
-        auto file = resolveInside(folder, t.file, job.limits);
-        done[i] =
-            file ? readImage(*file, header, t, atlas.pages[t.page], coverage[t.page], job.limits)
-                 : Result<void>(tl::unexpected(file.error().at(where)));
-    });
-    for (auto& result : done) {
-        if (!result) return propagate(result);
-    }
+        STX_TRY(const auto file, within(where, resolveInside(folder, t.file, job.limits)));
+        return readImage(file, header, t, atlas.pages[t.page], coverage[t.page], job.limits);
+    }));
     for (std::size_t i = 0; i < coverage.size(); ++i) {
         if (!coverage[i].empty()) setAlpha(*atlas.pages[i].texture.rgba8(), coverage[i]);
     }
@@ -422,9 +404,8 @@ Result<Atlas> readExr(const fs::path& path, Job& job) {
         }
         STX_CHECK(readFloats(reader, i, attributes, header.linear, atlas.pages[i]));
     }
-    if (const int at = environmentPartOf(reader); at >= 0) {
-        STX_TRY(atlas.environment, readEnvironmentPart(reader, at, job));
-    }
+    if (const int at = environmentPartOf(reader); at >= 0)
+        STX_SET(atlas.environment, readEnvironmentPart(reader, at, job));
     return checked(std::move(atlas), header, reader.where());
 }
 
@@ -470,8 +451,7 @@ Result<void> writeAtlas(const Atlas& atlas, const fs::path& path, Job& job,
 Result<void> writeAtlas(Atlas&& atlas, const fs::path& path, Job& job,
                         const AtlasSaveOptions& options) {
     Atlas own = std::move(atlas);
-    return writeAny(own, path, job, options,
-                    [&own](int page) { own.pages[static_cast<std::size_t>(page)].depth = {}; });
+    return writeAny(own, path, job, options, [&own](int page) { own.pages[page].depth = {}; });
 }
 
 int largestImageSide(const Atlas& atlas, const fs::path& path, const AtlasSaveOptions& options) {
@@ -519,9 +499,8 @@ Result<glm::ivec2> atlasTextureSize(const fs::path& path, const AtlasTexture& te
         return sizeOf(reader.parts()[0]);
     }
     STX_TRY(const auto bytes, readFile(file, limits));
-    const auto info = probeImage(bytes);
-    if (!info) return tl::unexpected(info.error().at(fmt::format("'{}'", file.string())));
-    return glm::ivec2(info->width, info->height);
+    STX_TRY(const auto info, within(fmt::format("'{}'", file.string()), probeImage(bytes)));
+    return glm::ivec2(info.width, info.height);
 }
 
 Result<void> readAtlasTexture(const fs::path& path, const AtlasHeader& header,

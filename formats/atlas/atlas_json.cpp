@@ -397,8 +397,7 @@ std::string atlasJson(const AtlasHeader& header) {
 Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& where,
                                   const Limits& limits, AtlasChecks checks) {
     // A parsed document takes some 30 times its text.
-    if (auto ok = limits.checkAllocation(text.size(), 32, "the atlas' JSON"); !ok)
-        return tl::unexpected(ok.error().at(where));
+    STX_CHECK(within(where, limits.checkAllocation(text.size(), 32, "the atlas' JSON")));
     STX_CHECK(checkNesting(text, where, std::min(limits.maxNesting, 16)));
     STX_TRY(const Json json, parse(text, where));
     if (!json.is_object())

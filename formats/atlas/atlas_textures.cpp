@@ -36,13 +36,13 @@ DepthCodes depthCodes(const Atlas& atlas, int page) {
     DepthCodes result;
     result.codes = Image<std::uint16_t>(depth.width(), depth.height());
     std::atomic<std::int64_t> outside = 0, clamped = 0;
-    parallelFor(0, depth.height(), [&](std::int64_t row) {
-        const auto owner = ownersOfRow(atlas, page, static_cast<int>(row), depth.width());
+    parallelFor(0, depth.height(), [&](int row) {
+        const auto owner = ownersOfRow(atlas, page, row, depth.width());
         std::int64_t lost = 0, moved = 0;
-        for (int x = 0, y = static_cast<int>(row); x < depth.width(); ++x) {
+        for (int x = 0, y = row; x < depth.width(); ++x) {
             const float d = depth.at(x, y);
             if (!hasPoint(d)) continue;
-            const int view = owner[static_cast<std::size_t>(x)];
+            const int view = owner[x];
             if (view < 0) {
                 ++lost;
                 continue;
@@ -64,11 +64,11 @@ Result<Image<float>> depthFromCodes(const Atlas& atlas, int page,
                                     const Image<std::uint16_t>& codes) {
     Image<float> depth(codes.width(), codes.height(), kNoDepth);
     std::atomic<bool> tooLarge = false;
-    parallelFor(0, codes.height(), [&](std::int64_t row) {
-        const auto owner = ownersOfRow(atlas, page, static_cast<int>(row), codes.width());
-        for (int x = 0, y = static_cast<int>(row); x < codes.width(); ++x) {
+    parallelFor(0, codes.height(), [&](int row) {
+        const auto owner = ownersOfRow(atlas, page, row, codes.width());
+        for (int x = 0, y = row; x < codes.width(); ++x) {
             const std::uint32_t d = codes.at(x, y);
-            const int view = owner[static_cast<std::size_t>(x)];
+            const int view = owner[x];
             if (d == 0 || view < 0) continue;
             const DepthCode code = atlas.views[view].depthCode();
             if (d > code.dmax) tooLarge = true;

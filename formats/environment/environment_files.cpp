@@ -88,7 +88,7 @@ Result<std::shared_ptr<const Environment>> openFolder(const fs::path& folder, Jo
                       kFileInFolder);
     if (!missing.empty())
         job.note(fmt::format("{}: faces without a picture show nothing: {}", where, missing));
-    if (auto ok = environment->check(); !ok) return tl::unexpected(ok.error().at(where));
+    STX_CHECK(within(where, environment->check()));
     int least = job.limits.maxImageSide, most = 0;
     for (const Texture& picture : environment->pictures) {
         if (picture.empty()) continue;
@@ -107,10 +107,9 @@ Result<std::shared_ptr<const Environment>> openScene(const fs::path& path, Job& 
     STX_TRY(const auto document, readMpeg4(path, job));
     mpeg4::SceneReadOptions options;
     options.folder = folderOf(path);
-    auto environment = mpeg4::environmentFromScene(document, options, job);
+    STX_TRY(auto environment, within(fmt::format("'{}'", path.string()),
+                                     mpeg4::environmentFromScene(document, options, job)));
     if (!environment)
-        return tl::unexpected(environment.error().at(fmt::format("'{}'", path.string())));
-    if (!*environment)
         return failAt(fmt::format("'{}'", path.string()), ErrorCode::invalidInput,
                       "the scene has no Background, so no environment");
     return environment;
@@ -173,7 +172,7 @@ Result<std::shared_ptr<const Environment>> openEnvironment(const fs::path& path,
     if (fs::is_directory(path, ec)) return openFolder(path, job);
     STX_TRY(auto source, ByteSource::open(path));
     Bytes head(static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), 4096)));
-    if (auto ok = source.read(0, head); !ok) return tl::unexpected(ok.error().at(where));
+    STX_CHECK(within(where, source.read(0, head)));
     if (isExrFile(head)) return readEnvironmentExr(path, job);
     if (mpeg4ContainerOf(ByteSpan(head)) || mpeg4ContainerOf(path)) return openScene(path, job);
     STX_TRY(Texture picture, readPicture(path, job));
@@ -198,9 +197,7 @@ Result<void> saveEnvironment(const Environment& environment, const fs::path& tar
     const std::string ending = lower(target.extension().string());
     if (ending.empty()) return saveFaces(environment, target, options, job);
     Environment sized = environment;
-    if (options.faceSize > 0) {
-        STX_TRY(sized, asCube(environment, options.faceSize, job.limits));
-    }
+    if (options.faceSize > 0) STX_SET(sized, asCube(environment, options.faceSize, job.limits));
     if (ending == ".exr") return writeEnvironmentExr(sized, target, job, output);
     if (mpeg4ContainerOf(target)) {
         mpeg4::SceneWriteOptions scene;

@@ -7,7 +7,7 @@
 
 #include "formats/exr/environment_exr.hpp"
 #include "formats/exr/exr_colour.hpp"
-#include "lib/base/parallel.hpp"
+#include "lib/base/parallel_try.hpp"
 
 // Our attributes, all exact.
 //   each part: stx:position (v3d) · stx:orientation (text: axis x y z, angle in radians) ·
@@ -191,9 +191,8 @@ Result<bool> writeViews(const ViewTable& table, bool hasPoints, const Summarise&
     std::vector<Bounds> each(count);
     const auto keep = [&](std::size_t i,
                           std::shared_ptr<const ReferenceView> view) -> Result<void> {
-        auto points = view->checkedPointCount();
-        if (!points) return tl::unexpected(points.error().at(fmt::format("view {}", i)));
-        setPixelAttributes(parts[i], *view, *points);
+        STX_TRY(auto points, within(fmt::format("view {}", i), view->checkedPointCount()));
+        setPixelAttributes(parts[i], *view, points);
         if (summarise) parts[i].attributes["stx:summary"] = summarise(*view).text();
         if (!about.bounds) each[i] = view->computeBounds();
         views[i] = std::move(view);
@@ -350,8 +349,7 @@ Result<void> writeExrViews(const ViewTable& table, const std::filesystem::path& 
                            OutputFile::Options options, const Summarise& summarise) {
     if (table.whole()) STX_CHECK(table.about().checkHeaders());
     STX_TRY(auto file, OutputFile::create(path, options));
-    if (auto ok = writeTable(table, summarise, file, job); !ok)
-        return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
+    STX_CHECK(within(fmt::format("'{}'", path.string()), writeTable(table, summarise, file, job)));
     return file.commit();
 }
 
@@ -374,10 +372,9 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
     header.linear = isLinearExr(reader);
     for (const int i : exrViewParts(reader)) {
         const ExrPart& part = reader.parts()[i];
-        auto view = exrCamera(part);
-        if (!view) return tl::unexpected(view.error().at(reader.where()));
+        STX_TRY(auto view, within(reader.where(), exrCamera(part)));
         ExrViewHeader entry;
-        entry.view = std::move(*view);
+        entry.view = std::move(view);
         if (auto ok = entry.view.camera.check(); !ok)
             return tl::unexpected(
                 ok.error().at(fmt::format("{}: part '{}'", reader.where(), part.name)));
@@ -394,9 +391,7 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
         header.views.push_back(std::move(entry));
     }
     if (const int at = environmentPartOf(reader); at >= 0) {
-        auto environment = environmentHeader(reader.parts()[static_cast<std::size_t>(at)]);
-        if (!environment) return tl::unexpected(environment.error().at(reader.where()));
-        header.environment = std::move(*environment);
+        STX_TRY(header.environment, within(reader.where(), environmentHeader(reader.parts()[at])));
     }
     if (header.views.empty())
         return failAt(reader.where(), ErrorCode::invalidInput,
@@ -446,8 +441,7 @@ class ExrViews : public ViewTable {
     Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job&) const override {
         auto view = std::make_shared<ReferenceView>(about().views[index]);
         const int part = parts_[index];
-        STX_CHECK(
-            readExrView(reader_, part, reader_.parts()[static_cast<std::size_t>(part)], *view));
+        STX_CHECK(readExrView(reader_, part, reader_.parts()[part], *view));
         if (auto ok = view->check(); !ok)
             return tl::unexpected(
                 ok.error().at(fmt::format("{}: view {}", reader_.where(), index)));
@@ -476,7 +470,7 @@ Result<std::unique_ptr<ViewTable>> openExrViews(const std::filesystem::path& pat
     STX_TRY(auto header, readExrBundleHeader(reader));
     std::vector<ViewImageKinds> kinds;
     for (const int i : exrViewParts(reader)) {
-        const ExrPart& part = reader.parts()[static_cast<std::size_t>(i)];
+        const ExrPart& part = reader.parts()[i];
         if (!isOurView(part)) return std::unique_ptr<ViewTable>();
         kinds.push_back(kindsOf(part, header.linear));
     }
@@ -498,25 +492,20 @@ Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
     const auto parts = exrViewParts(reader);
     std::uint64_t total = 0;
     for (const int i : parts) total += exrViewBytes(reader, reader.parts()[i]);
-    if (auto ok = job.limits.checkAllocation(total, 1, "the views"); !ok)
-        return tl::unexpected(ok.error().at(reader.where()));
+    STX_CHECK(within(reader.where(), job.limits.checkAllocation(total, 1, "the views")));
 
     const auto count = static_cast<std::int64_t>(parts.size());
-    std::vector<Result<void>> done(parts.size());
     std::atomic<std::int64_t> finished = 0;
-    parallelFor(0, count, [&](std::int64_t i) {
-        done[i] = job.checkCancelled();
-        if (!done[i]) return;
-        done[i] = readExrView(reader, parts[i], reader.parts()[parts[i]], bundle.views[i]);
+    const auto read = parallelTry(0, count, [&](std::int64_t i) -> Result<void> {
+        STX_CHECK(job.checkCancelled());
+        STX_CHECK(readExrView(reader, parts[i], reader.parts()[parts[i]], bundle.views[i]));
         job.progress(++finished, count, "reading views");
+        return {};
     });
-    for (auto& result : done) {
-        if (!result) return propagate(result);
-    }
-    if (const int at = environmentPartOf(reader); at >= 0) {
-        STX_TRY(bundle.environment, readEnvironmentPart(reader, at, job));
-    }
-    if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(reader.where()));
+    STX_CHECK(read);
+    if (const int at = environmentPartOf(reader); at >= 0)
+        STX_SET(bundle.environment, readEnvironmentPart(reader, at, job));
+    STX_CHECK(within(reader.where(), bundle.check()));
     return bundle;
 }
 

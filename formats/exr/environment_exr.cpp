@@ -122,14 +122,13 @@ Result<ExrEnvironmentHeader> environmentHeader(const ExrPart& part) {
 
 Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& reader, int index,
                                                                Job& job) {
-    const ExrPart& part = reader.parts()[static_cast<std::size_t>(index)];
-    auto header = environmentHeader(part);
-    if (!header) return tl::unexpected(header.error().at(reader.where()));
-    auto environment = std::make_shared<Environment>(std::move(header->environment));
+    const ExrPart& part = reader.parts()[index];
+    STX_TRY(auto header, within(reader.where(), environmentHeader(part)));
+    auto environment = std::make_shared<Environment>(std::move(header.environment));
     const auto count = static_cast<std::uint64_t>(part.width) * part.height;
-    if (auto ok = job.limits.checkAllocation(count, 2 * sizeof(glm::vec4), "the environment"); !ok)
-        return tl::unexpected(ok.error().at(reader.where()));
-    if (header->size.x > 0) {
+    STX_CHECK(within(reader.where(),
+                     job.limits.checkAllocation(count, 2 * sizeof(glm::vec4), "the environment")));
+    if (header.size.x > 0) {
         const bool rgb = part.channel("R") && part.channel("G") && part.channel("B");
         if (!rgb && !part.channel("Y"))
             return failAt(reader.where(), ErrorCode::invalidInput,
@@ -148,22 +147,22 @@ Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& 
                 if (!std::isfinite(p[c])) p[c] = 0.0f;
         }
         const auto texture = [&](const Image<glm::vec4>& image) {
-            return header->linear ? textureFromPremultiplied(image)
-                                  : textureFromPremultiplied8(image);
+            return header.linear ? textureFromPremultiplied(image)
+                                 : textureFromPremultiplied8(image);
         };
         if (environment->layout == Environment::Layout::equirectangular) {
             environment->pictures.push_back(texture(pixels));
         } else {
             environment->pictures.resize(6);
             for (std::size_t i = 0; i < kColumn.size(); ++i) {
-                if (std::ranges::find(header->faces, kColumn[i]) == header->faces.end()) continue;
+                if (std::ranges::find(header.faces, kColumn[i]) == header.faces.end()) continue;
                 const auto face = crop(pixels, static_cast<int>(i) * part.width, part.width);
                 environment->pictures[static_cast<std::size_t>(kColumn[i])] =
                     texture(isTurned(kColumn[i]) ? turned(face) : face);
             }
         }
     }
-    if (auto ok = environment->check(); !ok) return tl::unexpected(ok.error().at(reader.where()));
+    STX_CHECK(within(reader.where(), environment->check()));
     return std::shared_ptr<const Environment>(std::move(environment));
 }
 
@@ -283,7 +282,7 @@ Result<std::shared_ptr<const Environment>> readEnvironmentExr(const std::filesys
                       "it has no environment: no part with the attribute envmap, and its first "
                       "picture of {}x{} is not twice as wide as high",
                       first.width, first.height);
-    if (!reader.parts()[static_cast<std::size_t>(at)].linearPrimaries)
+    if (!reader.parts()[at].linearPrimaries)
         job.note(reader.where() +
                  ": its primaries are not Rec. 709; colours are taken as if they were");
     return readEnvironmentPart(reader, at, job);

@@ -255,8 +255,7 @@ Result<void> checkChunks(const ExrPart& part, const ChunkLayout& layout, const E
     };
     // The first one is named, on any number of threads.
     std::atomic<std::size_t> firstBad = count;
-    parallelFor(0, static_cast<std::int64_t>(count), [&](std::int64_t at) {
-        const auto i = static_cast<std::size_t>(at);
+    parallelFor(0, count, [&](std::size_t i) {
         if (i > firstBad || isGood(i)) return;
         std::size_t known = firstBad;
         while (i < known && !firstBad.compare_exchange_weak(known, i)) {

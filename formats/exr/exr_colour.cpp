@@ -102,7 +102,7 @@ Texture textureFromPremultiplied(const Image<glm::vec4>& premultiplied) {
 
 Result<Texture> readTexture(const ExrReader& reader, int index, bool linear,
                             const std::vector<ExrPixels>& others) {
-    const ExrPart& part = reader.parts()[static_cast<std::size_t>(index)];
+    const ExrPart& part = reader.parts()[index];
     const ColourChannels channels(part);
     Texture texture = linear ? Texture(RgbaFloatImage(part.width, part.height))
                              : Texture(Rgba8Image(part.width, part.height));
@@ -122,13 +122,13 @@ Result<Texture> readTexture(const ExrReader& reader, int index, bool linear,
         return pixels;
     };
     STX_CHECK(reader.readPart(index, place, [&](int y, int rows) {
-        parallelFor(0, rows, [&](std::int64_t i) {
-            const auto row = rowOf(y, static_cast<int>(i));
+        parallelFor(0, rows, [&](int i) {
+            const auto row = rowOf(y, i);
             channels.complete(row);
             if (linear)
                 divideByAlpha(row, row);
             else
-                divideByAlpha(row, texture.rgba8()->row(y + static_cast<int>(i)));
+                divideByAlpha(row, texture.rgba8()->row(y + i));
         });
     }));
     bleedColour(texture);

@@ -193,7 +193,7 @@ struct ExrReader::Impl {
 
 bool ExrReader::Impl::readZippedChunk(int index, std::size_t chunk, Rows at,
                                       const std::vector<ExrPixels>& pixels) const {
-    const ExrPart& part = parts[static_cast<std::size_t>(index)];
+    const ExrPart& part = parts[index];
     const auto width = static_cast<std::size_t>(part.width);
     const int lines = exr::linesOfChunk(part.compression);
     const int top = static_cast<int>(chunk) * lines;
@@ -204,7 +204,7 @@ bool ExrReader::Impl::readZippedChunk(int index, std::size_t chunk, Rows at,
     // Of several parts each chunk says whose it is; then its first line, its size.
     std::int32_t head[3] = {};
     const std::size_t numbers = parts.size() > 1 ? 3 : 2;
-    const std::uint64_t offset = chunks[static_cast<std::size_t>(index)].offsets[chunk];
+    const std::uint64_t offset = chunks[index].offsets[chunk];
     if (!readAt(offset, head, 4 * numbers)) return false;
     if (numbers == 3 && head[0] != index) return false;
     const int first = file->header(index).dataWindow().min.y + top;
@@ -248,15 +248,14 @@ bool ExrReader::Impl::readZippedChunk(int index, std::size_t chunk, Rows at,
 }
 
 bool ExrReader::Impl::readZipped(int index, Rows at, const std::vector<ExrPixels>& pixels) const {
-    const ExrPart& part = parts[static_cast<std::size_t>(index)];
+    const ExrPart& part = parts[index];
     const Imf::Header& header = file->header(index);
     if (header.hasTileDescription() || (header.hasType() && header.type() != Imf::SCANLINEIMAGE) ||
         (part.compression != "zip" && part.compression != "zips"))
         return false;
     const int lines = exr::linesOfChunk(part.compression);
     const auto count = static_cast<std::size_t>((part.height + lines - 1) / lines);
-    if (static_cast<std::size_t>(index) >= chunks.size() ||
-        chunks[static_cast<std::size_t>(index)].offsets.size() != count)
+    if (static_cast<std::size_t>(index) >= chunks.size() || chunks[index].offsets.size() != count)
         return false;
     for (const auto& c : part.channels) {
         if (c.xSampling != 1 || c.ySampling != 1 || c.type == ExrChannel::Type::uint32)
@@ -264,9 +263,8 @@ bool ExrReader::Impl::readZipped(int index, Rows at, const std::vector<ExrPixels
     }
     // Of a file that is damaged most chunks are not worth the work.
     std::atomic<bool> whole = true;
-    parallelFor(at.y / lines, (at.y + at.count + lines - 1) / lines, [&](std::int64_t i) {
-        if (whole && !readZippedChunk(index, static_cast<std::size_t>(i), at, pixels))
-            whole = false;
+    parallelFor(at.y / lines, (at.y + at.count + lines - 1) / lines, [&](std::size_t i) {
+        if (whole && !readZippedChunk(index, i, at, pixels)) whole = false;
     });
     return whole;
 }
@@ -287,7 +285,7 @@ exr::ChunkLayout ExrReader::Impl::layoutOf(int index) const {
 }
 
 std::int64_t ExrReader::Impl::stepOf(int index) const {
-    const ExrPart& part = parts[static_cast<std::size_t>(index)];
+    const ExrPart& part = parts[index];
     const int tile = layoutOf(index).tileHeight;
     // A compression of later days: whatever its chunks are.
     const int lines = tile > 0 ? tile : exr::linesOfChunk(part.compression);
@@ -332,8 +330,7 @@ Result<void> ExrReader::Impl::readHeaders(const Limits& limits) {
             return failAt(where, ErrorCode::invalidInput, "it has {} parts; 1 to {} are read",
                           file->parts(), limits.maxViews);
         for (int i = 0; i < file->parts(); ++i) {
-            if (auto ok = checkWindows(file->header(i), limits, i); !ok)
-                return tl::unexpected(ok.error().at(where));
+            STX_CHECK(within(where, checkWindows(file->header(i), limits, i)));
             parts.push_back(partFrom(file->header(i)));
         }
         chunks = exrChunksOfParts([this](std::uint64_t offset, void* to,
@@ -379,7 +376,7 @@ Result<void> ExrReader::checkPlausible(int index) const {
 }
 
 Result<void> ExrReader::Impl::checkPlausible(int index) const {
-    const ExrPart& part = parts[static_cast<std::size_t>(index)];
+    const ExrPart& part = parts[index];
     const auto values = static_cast<std::uint64_t>(part.width) * part.height * part.channels.size();
     const std::uint64_t stored = part.bytes ? part.bytes : size;
     // Deflate over runs gives at most some thousand for one; small claims hurt nobody.
@@ -416,7 +413,7 @@ Result<void> ExrReader::Impl::readRows(int index, int rows, const Place& place,
 
 Result<void> ExrReader::Impl::readAllRows(int index, int rows, const Place& place,
                                           const Take& take) const {
-    const ExrPart& part = parts[static_cast<std::size_t>(index)];
+    const ExrPart& part = parts[index];
     if (part.deep)
         return failAt(where, ErrorCode::unsupported,
                       "part {} has deep pixels, which are not supported", index);
@@ -451,8 +448,7 @@ Result<void> ExrReader::Impl::readAllRows(int index, int rows, const Place& plac
             if (buffer.begin() != buffer.end()) {
                 zipped = zipped && readZipped(index, at, pixels);
                 if (!zipped && !checked) {
-                    if (auto ok = checkChunks(index); !ok)
-                        return tl::unexpected(ok.error().at(where));
+                    STX_CHECK(within(where, checkChunks(index)));
                     checked = true;
                 }
                 if (!zipped) {

@@ -262,7 +262,7 @@ Result<void> ExrWriter::Impl::writeRows(int index, int top, int rows,
     }
 
     std::vector<Bytes> chunks(static_cast<std::size_t>(chunksOf(rows)));
-    parallelFor(0, static_cast<std::int64_t>(chunks.size()), [&](std::int64_t i) {
+    parallelFor(0, chunks.size(), [&](std::int64_t i) {
         const int first = static_cast<int>(i) * kZipRows;
         const int count = std::min(kZipRows, rows - first);
         const auto split = std::make_unique_for_overwrite<std::uint8_t[]>(

@@ -37,9 +37,9 @@ Result<DecodedImage> decodeExr(ByteSpan bytes, std::string_view name, const Limi
             image.channelNames.push_back(channel.name);
     }
     const auto pixels = static_cast<std::uint64_t>(part.width) * part.height;
-    if (auto ok = limits.checkAllocation(pixels, part.channels.size() * sizeof(float), "the image");
-        !ok)
-        return tl::unexpected(ok.error().at(reader.where()));
+    STX_CHECK(
+        within(reader.where(),
+               limits.checkAllocation(pixels, part.channels.size() * sizeof(float), "the image")));
     STX_CHECK(reader.checkPlausible(0));
     auto& values = image.values.emplace<2>(pixels * part.channels.size());
     std::vector<ExrPixels> targets;

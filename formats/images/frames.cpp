@@ -192,13 +192,10 @@ ExrFrame exrFrameOf(const Frame& frame, const std::optional<glm::vec3>& backgrou
             out.channels.emplace_back(fmt::format("N.{}", "XYZ"[c]), c + planes);
         std::uint16_t* const first = next(3);
         const auto width = static_cast<std::size_t>(out.width);
-        parallelForBlocks(0, out.height, 16, [&](std::int64_t begin, std::int64_t end) {
-            for (auto y = static_cast<int>(begin); y < end; ++y) {
-                std::uint16_t* const to = first + static_cast<std::size_t>(y) * width;
-                for (std::size_t c = 0; c < 3; ++c)
-                    exr::halvesFrom(&frame.normal.row(y).data()->x + c, 3,
-                                    {to + c * pixels, width});
-            }
+        parallelFor(0, out.height, 16, [&](int y) {
+            std::uint16_t* const to = first + static_cast<std::size_t>(y) * width;
+            for (std::size_t c = 0; c < 3; ++c)
+                exr::halvesFrom(&frame.normal.row(y).data()->x + c, 3, {to + c * pixels, width});
         });
     }
     out.depth = frame.depth;
@@ -208,8 +205,7 @@ ExrFrame exrFrameOf(const Frame& frame, const std::optional<glm::vec3>& backgrou
 Result<void> writeExrFrame(const ExrFrame& frame, const std::filesystem::path& path,
                            const FrameOptions& options) {
     STX_TRY(auto file, OutputFile::create(path, {.noClobber = options.noClobber}));
-    if (auto ok = writeExr(frame, file, options); !ok)
-        return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
+    STX_CHECK(within(fmt::format("'{}'", path.string()), writeExr(frame, file, options)));
     return file.commit();
 }
 
@@ -218,8 +214,8 @@ Result<void> writePicture(const Rgba8Image& picture, const std::filesystem::path
     STX_TRY(const FrameFormat format, frameFormat(path));
     STX_TRY(auto file, OutputFile::create(path, {.noClobber = options.noClobber}));
     if (format == FrameFormat::tiff || format == FrameFormat::webp) {
-        if (auto ok = writeByModule(picture, format, file, options); !ok)
-            return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
+        STX_CHECK(within(fmt::format("'{}'", path.string()),
+                         writeByModule(picture, format, file, options)));
     } else {
         STX_TRY(const auto bytes, encodePicture(picture, format, options));
         STX_CHECK(file.write(bytes));

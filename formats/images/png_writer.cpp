@@ -164,7 +164,7 @@ Result<Bytes> encodeWholePng(int width, int height, int channels, int bits, cons
     png.number32(static_cast<std::uint32_t>(height));
     png.byte(static_cast<std::uint32_t>(bits));
     constexpr std::array kColourTypes = {0u, 4u, 2u, 6u};  // grey, grey alpha, RGB, RGBA
-    png.byte(kColourTypes[static_cast<std::size_t>(channels - 1)]);
+    png.byte(kColourTypes[channels - 1]);
     for (int i = 0; i < 3; ++i) png.byte(0);  // deflate, the five filters, not interlaced
     png.end();
     if (srgb) {

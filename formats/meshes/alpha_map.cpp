@@ -7,11 +7,11 @@
 namespace stx {
 
 int textureWithAlpha(std::vector<MeshTexture>& textures, int base, int alpha) {
-    const auto& map = textures[static_cast<std::size_t>(alpha)];
+    const auto& map = textures[alpha];
     const auto& texels = map.pixels.pixels();
     const bool ownAlpha =
         std::any_of(texels.begin(), texels.end(), [](const glm::u8vec4& c) { return c.a != 255; });
-    MeshTexture out = base >= 0 ? textures[static_cast<std::size_t>(base)] : map;
+    MeshTexture out = base >= 0 ? textures[base] : map;
     for (int y = 0; y < out.pixels.height(); ++y) {
         for (int x = 0; x < out.pixels.width(); ++x) {
             const glm::vec2 uv((x + 0.5f) / out.pixels.width(), (y + 0.5f) / out.pixels.height());

@@ -62,10 +62,9 @@ class SceneConverter {
         }
         std::vector<glm::dmat4> worldFromNode;
         for (const auto& node : scene_.nodes) {
-            worldFromNode.push_back(node.parent < 0
-                                        ? glm::dmat4(node.parentFromNode)
-                                        : worldFromNode[static_cast<std::size_t>(node.parent)] *
-                                              glm::dmat4(node.parentFromNode));
+            worldFromNode.push_back(node.parent < 0 ? glm::dmat4(node.parentFromNode)
+                                                    : worldFromNode[node.parent] *
+                                                          glm::dmat4(node.parentFromNode));
             for (const std::uint32_t mesh : node.meshes)
                 STX_CHECK(convertMesh(scene_.meshes[mesh], worldFromNode.back()));
         }
@@ -125,9 +124,8 @@ class SceneConverter {
         if (!mtl.alphaMap.empty() && mtl.alphaMap != mtl.diffuseMap && !files_.replacesColour())
             STX_CHECK(addAlphaMap(source, m));
         STX_CHECK(addEmission(source, mtl, scene, m));
-        if (textureOf(source, Use::normals)) {
-            STX_TRY(m.normalTexture, texture(source, Use::normals));
-        }
+        if (textureOf(source, Use::normals))
+            STX_SET(m.normalTexture, texture(source, Use::normals));
         for (const auto& [has, label] : {std::pair{source.hasBump, "bump map"},
                                          {source.hasDisplacement, "displacement map"}}) {
             if (has)
@@ -144,8 +142,7 @@ class SceneConverter {
         STX_TRY(const int map, texture(source, Use::opacity));
         if (map < 0) return {};
         auto& textures = builder_.textures();
-        const auto& like = textures[static_cast<std::size_t>(
-            m.baseColourTexture >= 0 ? m.baseColourTexture : map)];
+        const auto& like = textures[m.baseColourTexture >= 0 ? m.baseColourTexture : map];
         STX_CHECK(builder_.charge(like.pixels.count(), sizeof(glm::u8vec4), "the alpha maps"));
         m.baseColourTexture = textureWithAlpha(textures, m.baseColourTexture, map);
         m.alpha = Material::Alpha::blend;
@@ -185,8 +182,7 @@ class SceneConverter {
         state.wrapU = wrap(named.wrapU);
         state.wrapV = wrap(named.wrapV);
         if (named.embedded >= 0)
-            return embeddedTexture(scene_.embedded[static_cast<std::size_t>(named.embedded)],
-                                   named.name, state);
+            return embeddedTexture(scene_.embedded[named.embedded], named.name, state);
         // Names are relative to the material file for some programs, to the model for others.
         return files_.textureFromFile(named.name, state, builder_.textures(), materialFolder_);
     }

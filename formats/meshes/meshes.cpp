@@ -100,10 +100,10 @@ std::filesystem::path textureBeside(const std::filesystem::path& model) {
 /// Gives every material this base colour texture.
 Result<void> addTexture(Mesh& mesh, const std::filesystem::path& path, Job& job) {
     STX_TRY(const auto bytes, readFile(path, job.limits));
-    auto pixels = decodeRgba8(bytes, path.filename().string(), job.limits);
-    if (!pixels) return tl::unexpected(pixels.error().at(fmt::format("'{}'", path.string())));
+    STX_TRY(auto pixels, within(fmt::format("'{}'", path.string()),
+                                decodeRgba8(bytes, path.filename().string(), job.limits)));
     const int index = static_cast<int>(mesh.textures.size());
-    mesh.textures.push_back({std::move(*pixels)});
+    mesh.textures.push_back({std::move(pixels)});
     for (auto& material : mesh.materials) {
         material.baseColourTexture = index;
     }
@@ -180,9 +180,7 @@ Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& given, Job& job,
     const auto where = fmt::format("'{}'", given.string());
     std::filesystem::path path = given;
     if (isPacked(given) && isGzip(bytes)) {
-        auto unpacked = gunzip(bytes, job.limits);
-        if (!unpacked) return tl::unexpected(unpacked.error().at(where));
-        bytes = std::move(*unpacked);
+        STX_TRY(bytes, within(where, gunzip(bytes, job.limits)));
         path.replace_extension();
     }
     if (bytes.empty())

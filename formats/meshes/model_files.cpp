@@ -54,7 +54,7 @@ std::optional<int> ModelFiles::known(std::string_view name, SamplerState s,
     if (it->second < 0) return -1;
     const Key key{std::string(name), s.wrapU, s.wrapV, s.nearest};
     if (const auto same = textures_.find(key); same != textures_.end()) return same->second;
-    MeshTexture copy = textures[static_cast<std::size_t>(it->second)];
+    MeshTexture copy = textures[it->second];
     copy.wrapU = s.wrapU;
     copy.wrapV = s.wrapV;
     copy.nearest = s.nearest;

@@ -144,9 +144,7 @@ class PlyReader {
             values_.beginElement();
             for (const auto& p : element.properties) {
                 std::size_t n = 1;
-                if (p.isList) {
-                    STX_TRY(n, length(element, i, p));
-                }
+                if (p.isList) STX_SET(n, length(element, i, p));
                 for (std::size_t k = 0; k < n; ++k) STX_CHECK(value(element, i, p.type));
             }
             values_.endElement();
@@ -242,9 +240,7 @@ class PlyReader {
             for (const auto& p : element.properties) {
                 const auto role = roleOf(p, true);
                 std::size_t n = 1;
-                if (p.isList) {
-                    STX_TRY(n, length(element, i, p));
-                }
+                if (p.isList) STX_SET(n, length(element, i, p));
                 for (std::size_t k = 0; k < n; ++k) {
                     STX_TRY(const double number, value(element, i, p.type));
                     if (role == Role::indices) indices.push_back(number);
@@ -322,9 +318,8 @@ class PlyReader {
         auto& materials = builder_.materials();
         for (const auto& name : header_.textureFiles) {
             Material m{.name = name, .hasColour = false};
-            if (hasUvs && !files_.replacesColour()) {
-                STX_TRY(m.baseColourTexture, files_.textureFromFile(name, {}, builder_.textures()));
-            }
+            if (hasUvs && !files_.replacesColour())
+                STX_SET(m.baseColourTexture, files_.textureFromFile(name, {}, builder_.textures()));
             materials.push_back(std::move(m));
         }
         if (materials.empty()) materials.push_back({.name = "default", .hasColour = false});

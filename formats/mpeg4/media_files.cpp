@@ -116,8 +116,7 @@ class MediaLoader {
 
     Result<void> load(ElementaryStream& stream, int odId) {
         if (stream.fileName.empty()) return {};
-        auto ok = loadNamed(stream);
-        if (!ok) return tl::unexpected(ok.error().at(fmt::format("object descriptor {}", odId)));
+        STX_CHECK(within(fmt::format("object descriptor {}", odId), loadNamed(stream)));
         return {};
     }
 

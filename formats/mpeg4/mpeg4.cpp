@@ -159,7 +159,7 @@ Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job) {
         STX_TRY(source, ByteSource::open(path));
     }
     Bytes head(static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), 4096)));
-    if (auto ok = source.read(0, head); !ok) return tl::unexpected(ok.error().at(where));
+    STX_CHECK(within(where, source.read(0, head)));
     auto container = mpeg4ContainerOf(ByteSpan(head));
     if (!container) container = mpeg4ContainerOf(path);
     if (!container)
@@ -167,18 +167,13 @@ Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job) {
             where, ErrorCode::invalidInput,
             "the file is neither an MP4 nor a BT or XMT-A text (endings .mp4, .bt, .xmt)");
     if (*container == Mpeg4Container::mp4) {
-        auto document = readMp4(source, job);
-        if (!document) return tl::unexpected(document.error().at(where));
-        return document;
+        return within(where, readMp4(source, job));
     }
-    if (path != "-") {
-        STX_TRY(whole, readFile(path, job.limits));
-    }
+    if (path != "-") STX_SET(whole, readFile(path, job.limits));
     auto document = *container == Mpeg4Container::bt ? readBt(textOf(whole), path.string(), job)
                                                      : readXmt(textOf(whole), path.string(), job);
     if (!document) return document;
-    if (auto ok = loadMedia(*document, folderOf(path), job); !ok)
-        return tl::unexpected(ok.error().at(where));
+    STX_CHECK(within(where, loadMedia(*document, folderOf(path), job)));
     return document;
 }
 
@@ -212,27 +207,22 @@ Result<Bundle> readMpeg4Bundle(const std::filesystem::path& path, Job& job) {
     STX_TRY(const auto document, readMpeg4(path, job));
     SceneReadOptions options;
     options.folder = folderOf(path);
-    auto bundle = bundleFromScene(document, options, job);
-    if (!bundle) return tl::unexpected(bundle.error().at(fmt::format("'{}'", path.string())));
-    return bundle;
+    return within(fmt::format("'{}'", path.string()), bundleFromScene(document, options, job));
 }
 
 Result<std::unique_ptr<ViewTable>> openMpeg4Views(const std::filesystem::path& path, Job& job) {
     STX_TRY(auto document, readMpeg4(path, job));
     SceneReadOptions options;
     options.folder = folderOf(path);
-    auto table =
-        viewsFromScene(std::make_shared<const Document>(std::move(document)), options, job);
-    if (!table) return tl::unexpected(table.error().at(fmt::format("'{}'", path.string())));
-    return table;
+    return within(
+        fmt::format("'{}'", path.string()),
+        viewsFromScene(std::make_shared<const Document>(std::move(document)), options, job));
 }
 
 Result<void> writeMpeg4Views(const ViewTable& table, const std::filesystem::path& path, Job& job,
                              const SceneWriteOptions& scene, const Mpeg4WriteOptions& options) {
     std::optional<PictureSpool> spool;
-    if (path != "-") {
-        STX_TRY(spool, PictureSpool::create(folderOf(path)));
-    }
+    if (path != "-") STX_SET(spool, PictureSpool::create(folderOf(path)));
     STX_TRY(const auto document, sceneFromViews(table, scene, spool ? &*spool : nullptr, job));
     return writeMpeg4(document, path, job, options);
 }

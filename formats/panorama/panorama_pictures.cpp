@@ -35,11 +35,9 @@ class PictureFiles final : public PictureSource {
         return {};
     }
     [[nodiscard]] int count() const override { return static_cast<int>(files_.size()); }
-    [[nodiscard]] std::string name(int k) const override {
-        return files_[static_cast<std::size_t>(k)].filename().string();
-    }
+    [[nodiscard]] std::string name(int k) const override { return files_[k].filename().string(); }
     [[nodiscard]] double focalHint(int k) const override {
-        return notes_[static_cast<std::size_t>(k)].focal35 / kHalfDiagonal35;
+        return notes_[k].focal35 / kHalfDiagonal35;
     }
     [[nodiscard]] Result<Rgba8Image> picture(int k) override {
         const auto at = static_cast<std::size_t>(k);
@@ -89,11 +87,10 @@ Result<std::unique_ptr<PictureSource>> openPanoramaPictures(const std::vector<fs
     Job aside;
     aside.limits = job.limits;
     std::error_code ec;
-    if (inputs.size() == 1 && fs::is_directory(inputs[0], ec)) {
-        STX_TRY(files, filesOf(numberedPictures(inputs[0], aside)));
-    } else if (inputs.size() == 1 && !fs::exists(inputs[0], ec) && isSequencePattern(inputs[0])) {
-        STX_TRY(files, filesOf(picturesOfPattern(inputs[0], aside)));
-    }
+    if (inputs.size() == 1 && fs::is_directory(inputs[0], ec))
+        STX_SET(files, filesOf(numberedPictures(inputs[0], aside)));
+    else if (inputs.size() == 1 && !fs::exists(inputs[0], ec) && isSequencePattern(inputs[0]))
+        STX_SET(files, filesOf(picturesOfPattern(inputs[0], aside)));
     for (const fs::path& file : files)
         if (fs::is_directory(file, ec))
             return fail(ErrorCode::usage,

@@ -76,9 +76,8 @@ Result<void> writePanoramaInto(PanoramaImage panorama, const fs::path& bundle, c
                                const PanoramaWriteOptions& options, Job& job) {
     STX_TRY(auto frames, openSequence(bundle, {}, job));
     auto environment = environmentOf(std::move(panorama.pixels));
-    if (options.faceSize > 0) {
-        STX_TRY(*environment, asCube(*environment, options.faceSize, job.limits));
-    }
+    if (options.faceSize > 0)
+        STX_SET(*environment, asCube(*environment, options.faceSize, job.limits));
     frames = changed(std::move(frames), [environment](Bundle& frame, Job&) -> Result<void> {
         frame.environment = environment;
         return {};

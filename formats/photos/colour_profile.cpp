@@ -53,8 +53,8 @@ std::string toSrgb(Rgba8Image& picture, ByteSpan profile) {
                                                  cmsFLAGS_NOCACHE | cmsFLAGS_COPY_ALPHA));
     if (!transform) return kTaken;
     if (keeps(transform)) return {};
-    parallelFor(0, picture.height(), [&](std::int64_t y) {
-        const auto row = picture.row(static_cast<int>(y));
+    parallelFor(0, picture.height(), [&](int y) {
+        const auto row = picture.row(y);
         cmsDoTransform(transform.get(), row.data(), row.data(),
                        static_cast<cmsUInt32Number>(row.size()));
     });

@@ -114,9 +114,8 @@ Result<bool> readGDepth(const JpegPhoto& jpeg, Photo& photo, const Limits& limit
     STX_TRY(photo.depth, pictureInText(*data, "its depth"));
     if (const auto sharp = text(kGImage, "Data"); sharp) {
         photo.colourIs = jpeg.options.portrait ? "portrait" : "original";
-        if (!jpeg.options.portrait) {
-            STX_TRY(photo.colour, pictureInText(*sharp, "its original picture"));
-        }
+        if (!jpeg.options.portrait)
+            STX_SET(photo.colour, pictureInText(*sharp, "its original picture"));
     }
     return true;
 }
@@ -156,10 +155,9 @@ Result<bool> readDynamicDepth(const JpegPhoto& jpeg, Photo& photo) {
     const auto original = xmp.text(kDepthImage, "ItemURI");
     if (const ContainerItem* sharp = original ? find(*original) : nullptr) {
         photo.colourIs = jpeg.options.portrait ? "portrait" : "original";
-        if (!jpeg.options.portrait) {
-            STX_TRY(photo.colour, embeddedPicture(file.subspan(sharp->offset, sharp->length),
+        if (!jpeg.options.portrait)
+            STX_SET(photo.colour, embeddedPicture(file.subspan(sharp->offset, sharp->length),
                                                   jpeg.file, "its original picture"));
-        }
     }
     for (const ContainerItem& item : items)
         if (item.semantic == "GainMap") photo.others.emplace_back("a gain map");

@@ -151,10 +151,10 @@ Result<PhotoDepthValues> greyOf(const DecodedImage& image, std::string_view what
 /// A grey picture of a photo, as it is stored.
 Result<PhotoDepthValues> decodeGrey(const PhotoImage& from, std::string_view what,
                                     const Limits& limits) {
-    auto decoded = from.coding == PhotoImage::Coding::heif ? decodeHeifItem(from, true, limits)
-                                                           : decodeImage(from.bytes, what, limits);
-    if (!decoded) return tl::unexpected(decoded.error().at(std::string(what)));
-    return greyOf(*decoded, what);
+    STX_TRY(auto decoded, within(std::string(what), from.coding == PhotoImage::Coding::heif
+                                                        ? decodeHeifItem(from, true, limits)
+                                                        : decodeImage(from.bytes, what, limits)));
+    return greyOf(decoded, what);
 }
 
 }  // namespace

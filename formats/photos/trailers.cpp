@@ -115,10 +115,9 @@ Result<bool> readSamsung(const JpegPhoto& jpeg, Photo& photo) {
     photo.coding = "white is near";
     if (const SefBlock* sharp = find(kPicture, "DualShot_1")) {
         photo.colourIs = jpeg.options.portrait ? "portrait" : "original";
-        if (!jpeg.options.portrait) {
-            STX_TRY(photo.colour,
+        if (!jpeg.options.portrait)
+            STX_SET(photo.colour,
                     embeddedPicture(sharp->content, jpeg.file, "its original picture"));
-        }
     }
     return true;
 }
@@ -167,10 +166,9 @@ Result<bool> readHuawei(const JpegPhoto& jpeg, Photo& photo) {
     if (jpegBytes > at - kBefore)
         return damaged(fmt::format("a picture of {} bytes before byte {}", jpegBytes, at));
     photo.colourIs = jpeg.options.portrait ? "portrait" : "original";
-    if (!jpeg.options.portrait) {
-        STX_TRY(photo.colour, embeddedPicture(file.subspan(at - kBefore - jpegBytes, jpegBytes),
+    if (!jpeg.options.portrait)
+        STX_SET(photo.colour, embeddedPicture(file.subspan(at - kBefore - jpegBytes, jpegBytes),
                                               jpeg.file, "its original picture"));
-    }
     return true;
 }
 

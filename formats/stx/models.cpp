@@ -16,8 +16,8 @@ Bounds boundsOf(const Atlas& atlas) {
     Bounds bounds;
     if (!atlas.check()) return bounds;  // one that was moved from has no pages
     for (const auto& r : atlas.rectangles) {
-        const auto& view = atlas.views[static_cast<std::size_t>(r.view)];
-        const auto& depth = atlas.pages[static_cast<std::size_t>(r.page)].depth;
+        const auto& view = atlas.views[r.view];
+        const auto& depth = atlas.pages[r.page].depth;
         for (int y = r.viewY; y < r.viewY + r.height; ++y) {
             for (int x = r.viewX; x < r.viewX + r.width; ++x) {
                 const auto at = r.atlasFromView(x, y);

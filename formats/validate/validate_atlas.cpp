@@ -21,7 +21,7 @@ void checkRectangles(const std::vector<ReferenceView>& views, int pages, glm::iv
                       within(r.atlasX, r.atlasWidth(), pageSize.x) &&
                       within(r.atlasY, r.atlasHeight(), pageSize.y);
         if (inside) {
-            const Camera& c = views[static_cast<std::size_t>(r.view)].camera;
+            const Camera& c = views[r.view].camera;
             inside = within(r.viewX, r.width, c.width) && within(r.viewY, r.height, c.height);
         }
         if (inside) {
@@ -59,7 +59,7 @@ class OutsideCounts {
     void add(const Image<float>& depth, const std::vector<AtlasRectangle>& rectangles, int page) {
         for (const AtlasRectangle& r : rectangles) {
             if (r.page != page) continue;
-            const ReferenceView& view = views_[static_cast<std::size_t>(r.view)];
+            const ReferenceView& view = views_[r.view];
             const double slack = (view.farPlane - view.nearPlane) * 1e-4;
             for (int y = 0; y < r.atlasHeight(); ++y)
                 for (const float d : depth.row(r.atlasY + y)
@@ -68,7 +68,7 @@ class OutsideCounts {
                     if (std::isinf(d) && d > 0) continue;
                     ++points_;
                     if (!(d >= 0 && d >= view.nearPlane - slack && d <= view.farPlane + slack))
-                        ++outside_[static_cast<std::size_t>(r.view)];
+                        ++outside_[r.view];
                 }
         }
     }

@@ -64,7 +64,7 @@ Result<std::vector<Finding>> validateExrFile(const std::filesystem::path& path,
     std::size_t index = 0;
     for (const int at : exrViewParts(*reader)) {
         if (job.cancelled) break;
-        ExrPart part = reader->parts()[static_cast<std::size_t>(at)];
+        ExrPart part = reader->parts()[at];
         const std::string where = viewText(index++, part.name);
         auto view = exrCamera(part);
         if (!view) {

@@ -25,8 +25,7 @@ std::vector<Movie> moviesOf(const Node& texture, const StreamImages& images) {
         const ElementaryStream* stream = images.stream(**node);
         if (!stream || stream->samples.empty()) continue;
         if (stream->samples.size() > 1 || (*node)->is("MovieTexture"))
-            movies.push_back(
-                {texture.info->fields[static_cast<std::size_t>(field.index)].name, *node, stream});
+            movies.push_back({texture.info->fields[field.index].name, *node, stream});
     }
     return movies;
 }

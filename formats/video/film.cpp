@@ -182,11 +182,10 @@ Result<std::unique_ptr<Film>> Film::open(const fs::path& path, const Limits& lim
                       "into one: ffmpeg -i IN -c copy OUT.mkv");
     const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
     if (file.get() < 0) return failAt(film->where(), ErrorCode::io, "cannot be read");
-    auto process = VideoProcess::start(limits, file.get());
-    if (!process) return tl::unexpected(process.error().at(film->where()));
+    STX_TRY(auto process, within(film->where(), VideoProcess::start(limits, file.get())));
     STX_CHECK(checkWhole(file, format, film->where()));
     STX_CHECK(checkDataAreHere(file, format, film->where()));
-    film->process_ = std::move(*process);
+    film->process_ = std::move(process);
     video::Packer request;
     request.putText(format);
     STX_TRY(const auto answer, film->ask(video::Tag::openFilm, request, video::Tag::film));
@@ -217,10 +216,9 @@ int Film::firstVideo() const {
 }
 
 Result<void> Film::select(int track) {
-    if (track < 0 || track >= static_cast<int>(tracks_.size()) ||
-        !tracks_[static_cast<std::size_t>(track)].video)
+    if (track < 0 || track >= static_cast<int>(tracks_.size()) || !tracks_[track].video)
         return failAt(where(), ErrorCode::invalidInput, "it has no track of video");
-    const Track& chosenTrack = tracks_[static_cast<std::size_t>(track)];
+    const Track& chosenTrack = tracks_[track];
     if (chosenTrack.width < 1 || chosenTrack.height < 1 ||
         chosenTrack.width > limits_.maxImageSide || chosenTrack.height > limits_.maxImageSide)
         return failAt(where(), ErrorCode::invalidInput,
@@ -293,18 +291,14 @@ Result<void> Film::select(int track) {
 Result<VideoPicture> Film::picture(int k) {
     const std::lock_guard lock(mutex_);
     const auto at = static_cast<std::size_t>(k);
-    auto found = finder_->find(shown_[at], limits_);
-    if (!found)
-        return tl::unexpected(
-            found.error().at(fmt::format("{}: frame {} ({:.4g} s)", where(), k, times_[at])));
-    found->turn(turn_);
+    STX_TRY(auto found, within(fmt::format("{}: frame {} ({:.4g} s)", where(), k, times_[at]),
+                               finder_->find(shown_[at], limits_)));
+    found.turn(turn_);
     return found;
 }
 
 Result<Bytes> Film::ask(video::Tag request, const video::Packer& bytes, video::Tag expected) {
-    auto answer = process_->ask(request, bytes.bytes, expected);
-    if (!answer) return tl::unexpected(answer.error().at(where()));
-    return answer;
+    return within(where(), process_->ask(request, bytes.bytes, expected));
 }
 
 }  // namespace stx

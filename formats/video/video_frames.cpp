@@ -41,12 +41,8 @@ class PictureFrames final : public VideoFrames {
         STX_TRY(auto picture, read(static_cast<std::size_t>(k)));
         return std::make_shared<const Rgba8Image>(std::move(picture));
     }
-    [[nodiscard]] std::string name(int k) const override {
-        return files_[static_cast<std::size_t>(k)].stem().string();
-    }
-    [[nodiscard]] std::string place(int k) const override {
-        return inQuotes(files_[static_cast<std::size_t>(k)].string());
-    }
+    [[nodiscard]] std::string name(int k) const override { return files_[k].stem().string(); }
+    [[nodiscard]] std::string place(int k) const override { return inQuotes(files_[k].string()); }
     [[nodiscard]] std::string description() const override {
         return fmt::format("{} ({})", what_, counted(files_.size(), "picture"));
     }
@@ -95,7 +91,7 @@ class FilmFrames final : public VideoFrames {
   public:
     FilmFrames(std::unique_ptr<Film> film, int track, Job& job)
         : film_(std::move(film)), job_(job) {
-        const Film::Track& of = film_->tracks()[static_cast<std::size_t>(track)];
+        const Film::Track& of = film_->tracks()[track];
         size_ = {of.width, of.height};
     }
 

@@ -86,8 +86,7 @@ Result<void> takeFewerTriangles(const Bundle& bundle, std::size_t most,
     const std::size_t before = count();
     if (before <= most) return {};
     const double share = static_cast<double>(most) / static_cast<double>(before);
-    parallelFor(0, static_cast<std::int64_t>(surfaces.size()), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
+    parallelFor(0, surfaces.size(), [&](std::size_t at) {
         if (job.cancelled || surfaces[at].triangles.empty()) return;
         simplify(bundle.views[at].camera, share, surfaces[at]);
     });

@@ -25,8 +25,7 @@ constexpr float kFlat = 128.0f, kSteps = 127.0f;
 
 Rgba8Image coded(const RgbaFloatImage& linear) {
     Rgba8Image out(linear.width(), linear.height());
-    parallelFor(0, linear.height(), [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(0, linear.height(), [&](int y) {
         for (int x = 0; x < linear.width(); ++x) {
             const glm::vec4 c = linear.at(x, y);
             const auto byte = [](float v) {
@@ -233,9 +232,8 @@ Result<std::vector<PageImages>> PageScene::add(const Atlas& atlas, Job& job) {
     for (const AtlasRectangle& r : atlas.rectangles)
         rectangles_.push_back({firstView + r.view, firstPage + r.page, r.viewX, r.viewY, r.atlasX,
                                r.atlasY, r.atlasWidth(), r.atlasHeight(), r.turned ? 1 : 0});
-    if (std::ranges::any_of(atlas.pages, [](const auto& p) { return !p.splatU.empty(); })) {
-        STX_TRY(pages, splatImages(atlas, job));
-    }
+    if (std::ranges::any_of(atlas.pages, [](const auto& p) { return !p.splatU.empty(); }))
+        STX_SET(pages, splatImages(atlas, job));
     for (std::size_t i = 0; i < pages.size(); ++i) {
         STX_CHECK(job.checkCancelled());
         STX_TRY(auto images, imagesOf(atlas, i, colours_, ofViews, job.limits));

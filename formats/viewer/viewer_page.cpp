@@ -137,11 +137,10 @@ Result<Json> dataOf(const std::vector<ReferenceView>& views, const PagePoints& p
     j["facts"] = fmt::format("{}, {}", counted(views.size(), "view"),
                              counted(static_cast<std::size_t>(points.count), "point"));
     j["origin"] = listOf(origin);
-    if (single) {
+    if (single)
         j["start"] = startOfSingle(cameras[0], points.distance.value_or(0), points.nearPlane);
-    } else {
-        STX_TRY(j["start"], startOf(cameras, points.bounds));
-    }
+    else
+        STX_SET(j["start"], startOf(cameras, points.bounds));
     j["cameras"] = std::move(listed);
     j["times"] = line.times;
     j["end"] = line.end;
@@ -222,11 +221,10 @@ class PageViews {
         STX_CHECK(
             checkPeak({peak::kPage.what, 0}, pixels, 0, table->bytesHeld() + most, job.limits));
         out.about_ = headersOf(std::as_const(*table).about());
-        if (table->whole() || (out.groups_.size() == 1 && out.groups_[0].size() == 1)) {
-            STX_TRY(out.bundle_, wholeBundle(std::move(table), job));
-        } else {
+        if (table->whole() || (out.groups_.size() == 1 && out.groups_[0].size() == 1))
+            STX_SET(out.bundle_, wholeBundle(std::move(table), job));
+        else
             out.table_ = std::move(table);
-        }
         return out;
     }
 

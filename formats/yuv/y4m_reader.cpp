@@ -144,16 +144,14 @@ Result<Y4mReader> Y4mReader::open(ByteSource source, Job& job) {
 }
 
 Result<Rgba8Image> Y4mReader::frame(int k, const Limits& limits) const {
-    const std::uint64_t offset = frames_[static_cast<std::size_t>(k)];
+    const std::uint64_t offset = frames_[k];
     const auto name = fmt::format("frame {}", k);
     const auto load = [&]() -> Result<Rgba8Image> {
         const ByteRange range(source_, offset, format_.frameBytes());
         STX_TRY(const auto bytes, range.load(limits));
         return rgbFromYuv(bytes, format_, colour_, name, limits);
     };
-    auto image = load();
-    if (!image) return tl::unexpected(image.error().at(atByte(offset)));
-    return image;
+    return within(atByte(offset), load());
 }
 
 }  // namespace stx

@@ -57,8 +57,7 @@ Bytes y4mPlanes(const Image<glm::u8vec4>& opaque, const Y4mOptions& options) {
         const auto& p = opaque.at(std::min(x, width - 1), std::min(y, height - 1));
         return glm::dvec3(p.r, p.g, p.b);
     };
-    parallelFor(0, chromaHeight, [&](std::int64_t row) {
-        const int cy = static_cast<int>(row);
+    parallelFor(0, chromaHeight, [&](int cy) {
         for (int y = cy * step; y < std::min(height, (cy + 1) * step); ++y) {
             for (int x = 0; x < width; ++x)
                 planes[static_cast<std::size_t>(y) * width + x] = coder.y(rgb(x, y));

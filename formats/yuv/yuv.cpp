@@ -48,8 +48,7 @@ Result<std::vector<std::byte>> readFrameBytes(const std::filesystem::path& path,
         return failAt(inQuotes(path.string()), ErrorCode::invalidInput,
                       "frame {} is asked for, but the file holds {} (0 to {})", frame, frames,
                       frames - 1);
-    if (auto ok = limits.checkAllocation(count, 4, "a frame"); !ok)
-        return tl::unexpected(ok.error().at(inQuotes(path.string())));
+    STX_CHECK(within(inQuotes(path.string()), limits.checkAllocation(count, 4, "a frame")));
     std::ifstream file(path, std::ios::binary);
     file.seekg(static_cast<std::streamoff>(frame * f.frameBytes()));
     std::vector<std::byte> raw(count * (f.bits > 8 ? 2 : 1));
@@ -149,7 +148,7 @@ Result<Rgba8Image> rgbFromYuv(std::span<const std::byte> frame, const YuvFormat&
                 for (int i = 0; i < cw; ++i) {
                     const float a = plane[static_cast<std::size_t>(j0) * cw + i];
                     const float b = plane[static_cast<std::size_t>(j1) * cw + i];
-                    chromaRow[k][static_cast<std::size_t>(i)] = a + (b - a) * weight;
+                    chromaRow[k][i] = a + (b - a) * weight;
                 }
             }
         }

@@ -62,10 +62,10 @@ glm::vec3 colourOf(const Layer<Sample>& layer, float noise) {
     int count = 0;
     for (int worth = 0; worth < 4 && count < kEnough; ++worth) {
         for (int i = 0; i < known; ++i) {
-            const Sample& s = layer.samples[static_cast<std::size_t>(i)];
+            const Sample& s = layer.samples[i];
             if (s.key >> 6 != worth) continue;
             const glm::vec3 c = s.colour();
-            values[static_cast<std::size_t>(count++)] = {c, brightness(c)};
+            values[count++] = {c, brightness(c)};
         }
     }
     const auto begin = values.begin();
@@ -73,11 +73,11 @@ glm::vec3 colourOf(const Layer<Sample>& layer, float noise) {
               [](const Value& a, const Value& b) { return a.brightness < b.brightness; });
     // Two groups: the split of the largest difference between their means, weighed by size.
     float total = 0;
-    for (int i = 0; i < count; ++i) total += values[static_cast<std::size_t>(i)].brightness;
+    for (int i = 0; i < count; ++i) total += values[i].brightness;
     int split = 0;
     float below = 0, most = 0, apart = 0;
     for (int i = 1; i < count; ++i) {
-        below += values[static_cast<std::size_t>(i - 1)].brightness;
+        below += values[i - 1].brightness;
         const auto n = static_cast<float>(i), m = static_cast<float>(count - i);
         const float difference = (total - below) / m - below / n;
         if (difference * difference * n * m <= most) continue;
@@ -96,12 +96,10 @@ glm::vec3 colourOf(const Layer<Sample>& layer, float noise) {
     const int used = count - first, cut = used / 4;
     for (int channel = 0; channel < 3; ++channel) {
         std::array<float, kSamples> sorted{};
-        for (int i = 0; i < used; ++i)
-            sorted[static_cast<std::size_t>(i)] =
-                values[static_cast<std::size_t>(first + i)].colour[channel];
+        for (int i = 0; i < used; ++i) sorted[i] = values[first + i].colour[channel];
         std::sort(sorted.begin(), sorted.begin() + used);
         float sum = 0;
-        for (int i = cut; i < used - cut; ++i) sum += sorted[static_cast<std::size_t>(i)];
+        for (int i = cut; i < used - cut; ++i) sum += sorted[i];
         colour[channel] = sum / static_cast<float>(used - 2 * cut);
     }
     return colour;
@@ -246,29 +244,27 @@ void checkNeighbours(BackgroundModel& model, const DepthNoise& noise, float step
     };
     std::vector<std::vector<Closed>> closed(static_cast<std::size_t>(h));
     std::vector<std::vector<std::size_t>> dropped(static_cast<std::size_t>(h));
-    parallelForBlocks(0, h, 8, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y) {
-            for (int x = 0; x < w; ++x) {
-                const std::size_t pixel = static_cast<std::size_t>(y) * w + x;
-                const float here = depth.at(x, y);
-                if (hasPoint(here)) {
-                    if (!agree(here, at(x - 1, y)) && !agree(here, at(x + 1, y)) &&
-                        !agree(here, at(x, y - 1)) && !agree(here, at(x, y + 1)))
-                        dropped[static_cast<std::size_t>(y)].push_back(pixel);
-                    continue;
-                }
-                for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}}) {
-                    const float a = at(x - dx, y - dy), b = at(x + dx, y + dy);
-                    if (!agree(a, b)) continue;
-                    const std::size_t offset = static_cast<std::size_t>(dy) * w + dx;
-                    const std::size_t p = pixel - offset, q = pixel + offset;
-                    const Texture& t = model.view.texture;
-                    closed[static_cast<std::size_t>(y)].push_back(
-                        {pixel, 2 / (1 / a + 1 / b), 0.5f * (stepsOf(t, p) + stepsOf(t, q)),
-                         std::min(model.confidence.data()[p], model.confidence.data()[q]),
-                         std::min(model.lastSeen.data()[p], model.lastSeen.data()[q])});
-                    break;
-                }
+    parallelFor(0, h, 8, [&](int y) {
+        for (int x = 0; x < w; ++x) {
+            const std::size_t pixel = static_cast<std::size_t>(y) * w + x;
+            const float here = depth.at(x, y);
+            if (hasPoint(here)) {
+                if (!agree(here, at(x - 1, y)) && !agree(here, at(x + 1, y)) &&
+                    !agree(here, at(x, y - 1)) && !agree(here, at(x, y + 1)))
+                    dropped[y].push_back(pixel);
+                continue;
+            }
+            for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}}) {
+                const float a = at(x - dx, y - dy), b = at(x + dx, y + dy);
+                if (!agree(a, b)) continue;
+                const std::size_t offset = static_cast<std::size_t>(dy) * w + dx;
+                const std::size_t p = pixel - offset, q = pixel + offset;
+                const Texture& t = model.view.texture;
+                closed[y].push_back(
+                    {pixel, 2 / (1 / a + 1 / b), 0.5f * (stepsOf(t, p) + stepsOf(t, q)),
+                     std::min(model.confidence.data()[p], model.confidence.data()[q]),
+                     std::min(model.lastSeen.data()[p], model.lastSeen.data()[q])});
+                break;
             }
         }
     });

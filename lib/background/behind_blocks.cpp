@@ -30,13 +30,10 @@ Image<float> leastAround(const Image<float>& depth, float scale, NoDepth noDepth
     // One sees past what is empty; what is not known says nothing.
     const float nothing = noDepth == NoDepth::empty ? 0.0f : kInfinite;
     Image<float> least(w, h);
-    parallelForBlocks(0, static_cast<std::int64_t>(depth.count()), 1 << 16,
-                      [&](std::int64_t from, std::int64_t to) {
-                          for (std::int64_t i = from; i < to; ++i) {
-                              const float z = depth.data()[i];
-                              least.data()[i] = hasPoint(z) ? scale / z : nothing;
-                          }
-                      });
+    parallelFor(0, depth.count(), 1 << 16, [&](std::int64_t i) {
+        const float z = depth.data()[i];
+        least.data()[i] = hasPoint(z) ? scale / z : nothing;
+    });
     const float diagonal = std::sqrt(2.0f);
     for (int y = 0; y < h; ++y) {
         float* row = least.row(y).data();
@@ -107,8 +104,7 @@ Image<float> greatestWithin(const Layer& layer, int radius) {
             across.at(x, static_cast<int>(y)) = most;
         }
     });
-    parallelFor(0, size.y, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(0, size.y, [&](int y) {
         for (int x = 0; x < size.x; ++x) {
             float most = kNoParallax;
             for (int v = std::max(0, y - radius); v <= std::min(size.y - 1, y + radius); ++v)
@@ -161,10 +157,9 @@ void continueSide(Layer& layer, glm::ivec2 corner, glm::ivec2 along, glm::ivec2 
     std::vector<float> rim(static_cast<std::size_t>(count));
     for (int i = 0; i < count; ++i) {
         const glm::ivec2 at = corner + i * along;
-        rim[static_cast<std::size_t>(i)] = layer.front.at(at.x, at.y);
+        rim[i] = layer.front.at(at.x, at.y);
     }
-    parallelFor(1, reach + 1, [&](std::int64_t out) {
-        const int d = static_cast<int>(out);
+    parallelFor(1, reach + 1, [&](int d) {
         const std::vector<float> row = withoutNarrow(rim, d);
         // The corners belong to the side above or below.
         const int more = along.x != 0 ? layer.border.x : 0;
@@ -172,7 +167,7 @@ void continueSide(Layer& layer, glm::ivec2 corner, glm::ivec2 along, glm::ivec2 
             const glm::ivec2 at = corner + i * along + d * outwards;
             if (!layer.part.contains(at.x, at.y)) break;
             if (along.y != 0 && i >= count) break;
-            const float p = row[static_cast<std::size_t>(std::clamp(i, 0, count - 1))];
+            const float p = row[std::clamp(i, 0, count - 1)];
             layer.part.at(at.x, at.y) = p < 0 ? Part::shown : Part::around;
             layer.front.at(at.x, at.y) = layer.far.at(at.x, at.y) = layer.parallax.at(at.x, at.y) =
                 p;
@@ -206,15 +201,15 @@ Image<glm::vec3> smoothShown(const Layer& layer, int deviation) {
             const int u = x + k * step.x, v = y + k * step.y;
             if (!layer.inPhoto(u, v) || std::abs(layer.front.at(u, v) - own) > 2 * kOneSurface)
                 continue;
-            const float weight = weightOf[static_cast<std::size_t>(std::abs(k))];
+            const float weight = weightOf[std::abs(k)];
             weights += weight;
             sum += weight * of.at(u, v);
         }
         return sum / weights;
     };
     const auto pass = [&](const Image<glm::vec3>& from, Image<glm::vec3>& to, glm::ivec2 step) {
-        parallelFor(0, layer.photo.y, [&](std::int64_t row) {
-            const int y = static_cast<int>(row) + layer.border.y;
+        parallelFor(0, layer.photo.y, [&](int row) {
+            const int y = row + layer.border.y;
             for (int x = layer.border.x; x < layer.border.x + layer.photo.x; ++x)
                 to.at(x, y) = mean(from, x, y, step);
         });
@@ -240,9 +235,8 @@ Layer blocksOf(const ReferenceView& view, double scale, int step, glm::ivec2 bor
     layer.shown = layer.colour = Image<glm::vec3>(width, height, glm::vec3(0));
     {
         const Image<float> least = leastAround(view.depth, static_cast<float>(scale), view.noDepth);
-        parallelFor(0, layer.photo.y, [&](std::int64_t y) {
-            sumUpRow(view, least, static_cast<float>(scale), static_cast<int>(y), layer);
-        });
+        parallelFor(0, layer.photo.y,
+                    [&](int y) { sumUpRow(view, least, static_cast<float>(scale), y, layer); });
     }
     markMixed(layer);
     continueAround(layer);

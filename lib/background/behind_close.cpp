@@ -170,8 +170,7 @@ Image<float> seenBelow(const Layer& layer) {
     };
     // Negative, since spreadLeast() looks for the least.
     Image<float> seen(w, h, kNothingThere);
-    parallelFor(0, h, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(0, h, [&](int y) {
         for (int x = 0; x < w; ++x) {
             const float own = shown(layer.front, x, y);
             if (own < 0) continue;

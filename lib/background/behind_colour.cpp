@@ -165,8 +165,7 @@ void inventColour(Layer& layer) {
     }
     membrane.solve(kColourRounds, kColourRelaxation);
     for (std::size_t i = 0; i < number.size(); ++i)
-        if (number[i] >= 0)
-            layer.colour.data()[i] = membrane.values[static_cast<std::size_t>(number[i])];
+        if (number[i] >= 0) layer.colour.data()[i] = membrane.values[number[i]];
 }
 
 }  // namespace stx::behind

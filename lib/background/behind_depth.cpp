@@ -113,7 +113,7 @@ void smoothBehind(Layer& layer) {
         if (parallax >= 0) farthest = std::min(farthest, parallax);
     for (std::size_t i = 0; i < number.count(); ++i) {
         if (number.data()[i] < 0) continue;
-        const float value = membrane.values[static_cast<std::size_t>(number.data()[i])];
+        const float value = membrane.values[number.data()[i]];
         layer.parallax.data()[i] = std::min(std::max(value, farthest), layer.front.data()[i]);
     }
 }

@@ -163,8 +163,7 @@ std::int64_t drawBehind(const Layer& layer, const Sources& sources, const Refere
         out.texture = Rgba8Image(w, h, glm::u8vec4(0));
     const glm::ivec2 border = layer.border * layer.step;
     std::vector<std::int64_t> hidden(static_cast<std::size_t>(h), 0);
-    parallelFor(0, h, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(0, h, [&](int y) {
         for (int x = 0; x < w; ++x) {
             const auto block = blockToDraw(layer, drawn, photo.depth.size(), x, y);
             const Sample sample = block ? sampleAt(layer, *block, x, y) : Sample();
@@ -181,7 +180,7 @@ std::int64_t drawBehind(const Layer& layer, const Sources& sources, const Refere
             if (photo.depth.contains(u, v)) {
                 // Never before what is there.
                 if (hasPoint(photo.depth.at(u, v))) depth = std::max(depth, photo.depth.at(u, v));
-                ++hidden[static_cast<std::size_t>(y)];
+                ++hidden[y];
             }
             out.depth.at(x, y) = depth;
             put(out.texture, x, y, sample.colour + detailAt(layer, sources, photo, *block, {x, y}));

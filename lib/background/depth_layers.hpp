@@ -111,7 +111,7 @@ struct PixelLayers {
 template <class Sample>
 void PixelLayers<Sample>::keep(Layer<Sample>& layer, int known, const Sample& sample, bool heads) {
     if (known < kSamples) {
-        layer.samples[static_cast<std::size_t>(known)] = sample;
+        layer.samples[known] = sample;
         return;
     }
     auto worst = layer.samples.begin();
@@ -148,7 +148,7 @@ void PixelLayers<Sample>::merge(Layer<Sample>& layer, float tolerance) {
         const int theirs = other.sampleCount();
         int ours = layer.sampleCount();
         for (int i = 0; i < theirs; ++i) {
-            keep(layer, ours, other.samples[static_cast<std::size_t>(i)], false);
+            keep(layer, ours, other.samples[i], false);
             ours = std::min(ours + 1, kSamples);
         }
         // Measurements beside edges count only when both layers have no others.

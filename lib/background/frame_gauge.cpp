@@ -41,7 +41,7 @@ void DepthNoise::add(float before, float now) {
     const float share = std::abs(now - before) / before;
     const float step = 1 + kStepsPerOctave * std::log2(std::max(share, kLeastShare) / kLeastShare);
     const int slot = share < kLeastShare ? 0 : std::min(static_cast<int>(step), kSteps - 1);
-    ++counts_[binOf(before)][static_cast<std::size_t>(slot)];
+    ++counts_[binOf(before)][slot];
 }
 
 void DepthNoise::update() {
@@ -49,8 +49,7 @@ void DepthNoise::update() {
                                   std::uint64_t total) {
         std::uint64_t below = 0;
         int slot = 0;
-        while (slot < kSteps && 4 * (below + counts[static_cast<std::size_t>(slot)]) < 3 * total)
-            below += counts[static_cast<std::size_t>(slot++)];
+        while (slot < kSteps && 4 * (below + counts[slot]) < 3 * total) below += counts[slot++];
         if (slot == 0) return 0.0f;
         return kLeastShare * std::exp2((static_cast<float>(slot) - 0.5f) / kStepsPerOctave);
     };

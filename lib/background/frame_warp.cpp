@@ -53,25 +53,21 @@ WarpFrame carveFrame(const ReferenceView& view, const Camera& camera, bool empty
         if (known.data()[i] == 0 && !(emptyIsFar && view.texture.at(i).a == 0))
             known.data()[i] = kUnknown;
     frame.nearest = Image<float>(w, h);
-    parallelForBlocks(0, h, 16, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y) {
-            const float* in = known.row(y).data();
-            float* out = across.row(y).data();
-            for (int x = 0; x < w; ++x) {
-                float most = 0;
-                for (int k = std::max(x - kClear, 0); k <= std::min(x + kClear, w - 1); ++k)
-                    most = std::max(most, in[k]);
-                out[x] = most;
-            }
+    parallelFor(0, h, 16, [&](int y) {
+        const float* in = known.row(y).data();
+        float* out = across.row(y).data();
+        for (int x = 0; x < w; ++x) {
+            float most = 0;
+            for (int k = std::max(x - kClear, 0); k <= std::min(x + kClear, w - 1); ++k)
+                most = std::max(most, in[k]);
+            out[x] = most;
         }
     });
-    parallelForBlocks(0, h, 16, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y) {
-            float* out = frame.nearest.row(y).data();
-            for (int k = std::max(y - kClear, 0); k <= std::min(y + kClear, h - 1); ++k) {
-                const float* in = across.row(k).data();
-                for (int x = 0; x < w; ++x) out[x] = std::max(out[x], in[x]);
-            }
+    parallelFor(0, h, 16, [&](int y) {
+        float* out = frame.nearest.row(y).data();
+        for (int k = std::max(y - kClear, 0); k <= std::min(y + kClear, h - 1); ++k) {
+            const float* in = across.row(k).data();
+            for (int x = 0; x < w; ++x) out[x] = std::max(out[x], in[x]);
         }
     });
     return frame;
@@ -126,8 +122,8 @@ glm::vec3 colourAt(const WarpFrame& frame, const Spot& spot, float x, float y) {
     glm::vec3 sum(0.0f), least(1e30f), most(-1e30f);
     for (int j = 0; j < 4; ++j) {
         const glm::vec3* r = &colour.at(ix - 1, iy - 1 + j);
-        sum += down[static_cast<std::size_t>(j)] *
-               (across[0] * r[0] + across[1] * r[1] + across[2] * r[2] + across[3] * r[3]);
+        sum +=
+            down[j] * (across[0] * r[0] + across[1] * r[1] + across[2] * r[2] + across[3] * r[3]);
         least = glm::min(glm::min(least, glm::min(r[0], r[1])), glm::min(r[2], r[3]));
         most = glm::max(glm::max(most, glm::max(r[0], r[1])), glm::max(r[2], r[3]));
     }

@@ -182,11 +182,10 @@ void KeyBackground::Impl::forEachRay(const CameraPair& pair, const Visit& visit)
     const int w = width();
     std::visit(
         [&](auto& all) {
-            parallelForBlocks(0, height(), kRowsAtOnce, [&](std::int64_t from, std::int64_t to) {
-                for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y)
-                    for (int x = 0; x < w; ++x)
-                        visit(all, static_cast<std::size_t>(y) * w + x, x, y,
-                              pair.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
+            parallelFor(0, height(), kRowsAtOnce, [&](int y) {
+                for (int x = 0; x < w; ++x)
+                    visit(all, static_cast<std::size_t>(y) * w + x, x, y,
+                          pair.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
             });
         },
         pixels);
@@ -324,12 +323,8 @@ BackgroundModel KeyBackground::finish(int frames, double firstTime, const DepthN
     }
     std::visit(
         [&](const auto& all) {
-            parallelForBlocks(0, static_cast<std::int64_t>(s.key.depth.count()), 4096,
-                              [&](std::int64_t from, std::int64_t to) {
-                                  for (auto i = static_cast<std::size_t>(from);
-                                       i < static_cast<std::size_t>(to); ++i)
-                                      s.decide(all[i], i, vote, model, inFront);
-                              });
+            parallelFor(0, s.key.depth.count(), 4096,
+                        [&](std::size_t i) { s.decide(all[i], i, vote, model, inFront); });
         },
         s.pixels);
     s.pixels = {};

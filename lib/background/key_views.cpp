@@ -83,9 +83,9 @@ std::vector<int> chooseKeys(std::span<const Glimpse> glimpses, int most) {
     std::vector<SeenPoint> points;
     for (const Glimpse& g : glimpses) addPoints(g, points);
     std::vector<std::vector<std::uint8_t>> seen(glimpses.size());
-    parallelFor(0, static_cast<std::int64_t>(glimpses.size()), [&](std::int64_t i) {
-        const Glimpse& g = glimpses[static_cast<std::size_t>(i)];
-        auto& mine = seen[static_cast<std::size_t>(i)];
+    parallelFor(0, glimpses.size(), [&](std::size_t i) {
+        const Glimpse& g = glimpses[i];
+        auto& mine = seen[i];
         mine.resize(points.size());
         const glm::dmat3 turn = cameraFromWorld(g);
         for (std::size_t k = 0; k < points.size(); ++k) mine[k] = sees(g, turn, points[k]);
@@ -105,8 +105,7 @@ std::vector<int> chooseKeys(std::span<const Glimpse> glimpses, int most) {
         const double least = keys.empty() ? 0.0 : kWorthIt * static_cast<double>(points.size());
         if (best < 0 || static_cast<double>(bestAdds) < least) break;
         keys.push_back(best);
-        for (std::size_t k = 0; k < points.size(); ++k)
-            covered[k] |= seen[static_cast<std::size_t>(best)][k];
+        for (std::size_t k = 0; k < points.size(); ++k) covered[k] |= seen[best][k];
     }
     return keys;
 }

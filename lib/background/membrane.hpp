@@ -33,19 +33,16 @@ struct Membrane {
         constexpr std::int64_t kGrain = 1 << 13;
         for (int round = 0; round < 2 * rounds; ++round) {
             const auto& fields = turn[round % 2];
-            parallelForBlocks(0, static_cast<std::int64_t>(fields.size()), kGrain,
-                              [&](std::int64_t from, std::int64_t to) {
-                                  for (std::int64_t i = from; i < to; ++i) {
-                                      const std::int32_t at = fields[static_cast<std::size_t>(i)];
-                                      const Unknown& u = unknowns[static_cast<std::size_t>(at)];
-                                      if (!(u.count > 0)) continue;
-                                      Value sum = u.known;
-                                      for (const std::int32_t n : u.to)
-                                          if (n >= 0) sum += values[static_cast<std::size_t>(n)];
-                                      Value& value = values[static_cast<std::size_t>(at)];
-                                      value += relaxation * (sum / u.count - value);
-                                  }
-                              });
+            parallelFor(0, fields.size(), kGrain, [&](std::size_t i) {
+                const std::int32_t at = fields[i];
+                const Unknown& u = unknowns[at];
+                if (!(u.count > 0)) return;
+                Value sum = u.known;
+                for (const std::int32_t n : u.to)
+                    if (n >= 0) sum += values[n];
+                Value& value = values[at];
+                value += relaxation * (sum / u.count - value);
+            });
         }
     }
 };

@@ -69,19 +69,16 @@ Image<std::uint8_t> mixedPixels(const Image<float>& inverse, const DepthNoise& n
             if (y + 1 < h) take(row, inverse.row(y + 1).data(), w, 0);
             std::uint8_t* out = across.row(y - top).data();
             for (int x = 0; x < w; ++x)
-                out[x] = edge[static_cast<std::size_t>(x)] |
-                         edge[static_cast<std::size_t>(std::max(x - kReach, 0))] |
-                         edge[static_cast<std::size_t>(std::min(x + kReach, w - 1))];
+                out[x] =
+                    edge[x] | edge[std::max(x - kReach, 0)] | edge[std::min(x + kReach, w - 1)];
         }
     });
     Image<std::uint8_t> mixed(w, to - from, std::uint8_t{0});
-    parallelForBlocks(from, to, kRows, [&](std::int64_t begin, std::int64_t end) {
-        for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
-            std::uint8_t* out = mixed.row(y - from).data();
-            for (int k = std::max(y - kReach, top); k <= std::min(y + kReach, bottom - 1); ++k) {
-                const std::uint8_t* in = across.row(k - top).data();
-                for (int x = 0; x < w; ++x) out[x] |= in[x];
-            }
+    parallelFor(from, to, kRows, [&](int y) {
+        std::uint8_t* out = mixed.row(y - from).data();
+        for (int k = std::max(y - kReach, top); k <= std::min(y + kReach, bottom - 1); ++k) {
+            const std::uint8_t* in = across.row(k - top).data();
+            for (int x = 0; x < w; ++x) out[x] |= in[x];
         }
     });
     return mixed;

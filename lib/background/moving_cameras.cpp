@@ -120,7 +120,7 @@ Result<void> MovingCameras::choose() {
     // In the order of time: what follows does not depend on what adds most.
     std::sort(chosen_.begin(), chosen_.end());
     for (const int number : chosen_) {
-        const Moment& m = candidates_[static_cast<std::size_t>(number)];
+        const Moment& m = candidates_[number];
         STX_TRY(auto views, pictures(m.frame));
         keyCameras_.push_back(views[m.view].camera);
         keys_.push_back(std::move(views[m.view]));
@@ -139,7 +139,7 @@ Result<void> MovingCameras::registerKeys() {
     }
     for (std::size_t i = 0; i < probe.views.size(); ++i) probe.views[i].name = fmt::format("{}", i);
     std::vector<float> distances;
-    const Glimpse& first = glimpses_[static_cast<std::size_t>(chosen_[0])];
+    const Glimpse& first = glimpses_[chosen_[0]];
     for (const float d : first.depth.pixels())
         if (hasPoint(d)) distances.push_back(d);
     middle_ = medianOf(std::move(distances), 1.0f);
@@ -166,8 +166,7 @@ Result<Camera> MovingCameras::poseOf(const ReferenceView& view, const Moment& mo
     std::size_t best = 0;
     std::int64_t most = -1;
     for (std::size_t k = 0; k < keys_.size(); ++k) {
-        const std::int64_t shared =
-            sharedPoints(glimpse, glimpses_[static_cast<std::size_t>(chosen_[k])]);
+        const std::int64_t shared = sharedPoints(glimpse, glimpses_[chosen_[k]]);
         if (shared <= most) continue;
         most = shared;
         best = k;
@@ -197,10 +196,9 @@ Result<void> MovingCameras::see(std::vector<KeyBackground>& keys, std::size_t fi
                 lights[i] = keys[i].measure(views[k], camera, noise);
             noise.update();
             const WarpFrame warped = warpFrame(views[k], camera, noise);
-            parallelFor(0, static_cast<std::int64_t>(keys.size()), [&](std::int64_t i) {
-                keys[static_cast<std::size_t>(i)].see(
-                    warped, lights[static_cast<std::size_t>(i)], noise, number,
-                    static_cast<float>(times_[frame] - times_[0]));
+            parallelFor(0, keys.size(), [&](std::size_t i) {
+                keys[i].see(warped, lights[i], noise, number,
+                            static_cast<float>(times_[frame] - times_[0]));
             });
             if (first > 0) continue;
             points_ += views[k].pointCount();

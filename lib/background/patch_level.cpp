@@ -139,8 +139,7 @@ void PatchLevel::findReach() {
     const int w = front_.width(), h = front_.height();
     Image<float> across(w, h, kNever);
     reach_ = Image<float>(w, h, kNever);
-    parallelFor(photoFrom_.y, photoTo_.y, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(photoFrom_.y, photoTo_.y, [&](int y) {
         for (int x = photoFrom_.x + kRadius; x < photoTo_.x - kRadius; ++x) {
             float most = 0;
             for (int u = std::max(photoFrom_.x, x - kReach);
@@ -150,8 +149,7 @@ void PatchLevel::findReach() {
         }
     });
     parallelFor(photoFrom_.y + kRadius, std::max(photoFrom_.y + kRadius, photoTo_.y - kRadius),
-                [&](std::int64_t row) {
-                    const int y = static_cast<int>(row);
+                [&](int y) {
                     for (int x = photoFrom_.x + kRadius; x < photoTo_.x - kRadius; ++x) {
                         float most = 0;
                         for (int v = std::max(photoFrom_.y, y - kReach);
@@ -220,70 +218,61 @@ void PatchLevel::improve(int hop) {
     const int whole = std::max(photoTo_.x - photoFrom_.x, photoTo_.y - photoFrom_.y);
     Image<glm::ivec2> better = sources_;
     ++round_;
-    parallelForBlocks(
-        0, static_cast<std::int64_t>(list_.size()), kPatchGrain,
-        [&](std::int64_t from, std::int64_t to) {
-            for (std::int64_t i = from; i < to; ++i) {
-                const glm::ivec2 t = list_[static_cast<std::size_t>(i)];
-                const Place& place = places_.at(t.x, t.y);
-                glm::ivec2 best = sources_.at(t.x, t.y);
-                float least = best == kNowhere ? kNever : differ(t, best, kNever);
-                const auto attempt = [&](glm::ivec2 source) {
-                    if (source == best || !mayServe(source, place)) return;
-                    const float cost = differ(t, source, least);
-                    if (!(cost < least)) return;
-                    least = cost;
-                    best = source;
-                };
-                for (const glm::ivec2 step : hops) {
-                    const glm::ivec2 n = t + step;
-                    if (!sources_.contains(n.x, n.y)) continue;
-                    const glm::ivec2 theirs = sources_.at(n.x, n.y);
-                    if (theirs != kNowhere) attempt(theirs - step);
-                }
-                int reach = whole / 4;
-                for (int k = 0; k < kTries && reach > 0; ++k, reach /= 3)
-                    attempt(within(
-                        best == kNowhere ? t : best, reach, photoFrom_, photoTo_,
-                        chance(static_cast<std::uint32_t>(t.x), static_cast<std::uint32_t>(t.y),
-                               round_ * 16 + static_cast<std::uint32_t>(k))));
-                better.at(t.x, t.y) = best;
-                cost_.at(t.x, t.y) = least;
-            }
-        });
+    parallelFor(0, list_.size(), kPatchGrain, [&](std::size_t i) {
+        const glm::ivec2 t = list_[i];
+        const Place& place = places_.at(t.x, t.y);
+        glm::ivec2 best = sources_.at(t.x, t.y);
+        float least = best == kNowhere ? kNever : differ(t, best, kNever);
+        const auto attempt = [&](glm::ivec2 source) {
+            if (source == best || !mayServe(source, place)) return;
+            const float cost = differ(t, source, least);
+            if (!(cost < least)) return;
+            least = cost;
+            best = source;
+        };
+        for (const glm::ivec2 step : hops) {
+            const glm::ivec2 n = t + step;
+            if (!sources_.contains(n.x, n.y)) continue;
+            const glm::ivec2 theirs = sources_.at(n.x, n.y);
+            if (theirs != kNowhere) attempt(theirs - step);
+        }
+        int reach = whole / 4;
+        for (int k = 0; k < kTries && reach > 0; ++k, reach /= 3)
+            attempt(within(best == kNowhere ? t : best, reach, photoFrom_, photoTo_,
+                           chance(static_cast<std::uint32_t>(t.x), static_cast<std::uint32_t>(t.y),
+                                  round_ * 16 + static_cast<std::uint32_t>(k))));
+        better.at(t.x, t.y) = best;
+        cost_.at(t.x, t.y) = least;
+    });
     sources_ = std::move(better);
 }
 
 void PatchLevel::vote() {
     Image<glm::vec4> voted = target_;
-    parallelForBlocks(0, static_cast<std::int64_t>(list_.size()), kPatchGrain,
-                      [&](std::int64_t from, std::int64_t to) {
-                          for (std::int64_t i = from; i < to; ++i) {
-                              const glm::ivec2 t = list_[static_cast<std::size_t>(i)];
-                              const Place& place = places_.at(t.x, t.y);
-                              glm::vec4 sum(0);
-                              float weights = 0;
-                              for (int dy = -kRadius; dy <= kRadius; ++dy) {
-                                  for (int dx = -kRadius; dx <= kRadius; ++dx) {
-                                      const glm::ivec2 n = t + glm::ivec2(dx, dy);
-                                      if (!sources_.contains(n.x, n.y)) continue;
-                                      const glm::ivec2 source = sources_.at(n.x, n.y);
-                                      if (source == kNowhere ||
-                                          std::abs(places_.at(n.x, n.y).parallax - place.parallax) >
-                                              place.tolerance)
-                                          continue;
-                                      const float cost = std::min(cost_.at(n.x, n.y), 1e6f);
-                                      const float weight = 1 / (kHalfVote + cost);
-                                      weights += weight;
-                                      sum += weight * source_.at(source.x - dx, source.y - dy);
-                                  }
-                              }
-                              if (weights > 0) {
-                                  glm::vec4& c = voted.at(t.x, t.y);
-                                  c = glm::vec4(glm::vec3(sum) / weights, c.a);
-                              }
-                          }
-                      });
+    parallelFor(0, list_.size(), kPatchGrain, [&](std::size_t i) {
+        const glm::ivec2 t = list_[i];
+        const Place& place = places_.at(t.x, t.y);
+        glm::vec4 sum(0);
+        float weights = 0;
+        for (int dy = -kRadius; dy <= kRadius; ++dy) {
+            for (int dx = -kRadius; dx <= kRadius; ++dx) {
+                const glm::ivec2 n = t + glm::ivec2(dx, dy);
+                if (!sources_.contains(n.x, n.y)) continue;
+                const glm::ivec2 source = sources_.at(n.x, n.y);
+                if (source == kNowhere ||
+                    std::abs(places_.at(n.x, n.y).parallax - place.parallax) > place.tolerance)
+                    continue;
+                const float cost = std::min(cost_.at(n.x, n.y), 1e6f);
+                const float weight = 1 / (kHalfVote + cost);
+                weights += weight;
+                sum += weight * source_.at(source.x - dx, source.y - dy);
+            }
+        }
+        if (weights > 0) {
+            glm::vec4& c = voted.at(t.x, t.y);
+            c = glm::vec4(glm::vec3(sum) / weights, c.a);
+        }
+    });
     target_ = std::move(voted);
 }
 

@@ -34,8 +34,7 @@ Result<void> addFrame(std::vector<CameraBackground>& cameras, const Bundle& bund
             c.background.reset();
             continue;
         }
-        if (auto ok = c.background->add(view, time, job); !ok)
-            return tl::unexpected(ok.error().at(fmt::format("view '{}'", c.name)));
+        STX_CHECK(within(fmt::format("view '{}'", c.name), c.background->add(view, time, job)));
     }
     return {};
 }
@@ -81,8 +80,8 @@ Result<std::vector<BackgroundModel>> rememberBackgrounds(std::span<const double>
                     cameras.push_back({view.name, view.camera, std::move(background)});
                 }
             }
-            if (auto ok = addFrame(cameras, *bundle, times[frame], pass, job); !ok)
-                return tl::unexpected(ok.error().at(fmt::format("frame {}", frame)));
+            STX_CHECK(within(fmt::format("frame {}", frame),
+                             addFrame(cameras, *bundle, times[frame], pass, job)));
             job.progress(static_cast<std::int64_t>(times.size()) * pass +
                              static_cast<std::int64_t>(frame) + 1,
                          total(), "remembering");

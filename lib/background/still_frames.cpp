@@ -33,8 +33,7 @@ std::vector<int> spreadFrames(int count, int wanted) {
     const int n = wanted == 0 ? count : std::min(count, wanted);
     std::vector<int> which(static_cast<std::size_t>(n));
     for (std::int64_t i = 0; i < n; ++i)
-        which[static_cast<std::size_t>(i)] =
-            n == 1 ? 0 : static_cast<int>((i * (count - 1) + (n - 1) / 2) / (n - 1));
+        which[i] = n == 1 ? 0 : static_cast<int>((i * (count - 1) + (n - 1) / 2) / (n - 1));
     return which;
 }
 
@@ -48,15 +47,12 @@ Result<void> takeFrames(StillFrames& frames, std::span<const int> which, std::ui
         std::clamp<std::uint64_t>(bytes / one, 1, static_cast<std::uint64_t>(count)));
     // As many pieces as may be in memory at a time, where those are fewer than there are threads.
     const std::int64_t grain = atOnce >= threadCount() ? 1 : (count + atOnce - 1) / atOnce;
-    parallelForBlocks(0, count, grain, [&](std::int64_t begin, std::int64_t end) {
-        for (auto i = begin; i < end; ++i) {
-            const auto at = static_cast<std::size_t>(i);
-            const auto picture = frames.frame(which[at]);
-            if (picture)
-                take(at, **picture);
-            else
-                errors[at] = picture.error();
-        }
+    parallelFor(0, count, grain, [&](std::size_t at) {
+        const auto picture = frames.frame(which[at]);
+        if (picture)
+            take(at, **picture);
+        else
+            errors[at] = picture.error();
     });
     for (auto& error : errors)
         if (error) return tl::unexpected(std::move(*error));

@@ -19,9 +19,9 @@ constexpr std::size_t kSpeckShare = 5000;
 /// The largest difference of R, G and B.
 Image<std::uint8_t> channelDifference(const Rgba8Image& a, const Rgba8Image& b) {
     Image<std::uint8_t> out(a.width(), a.height());
-    parallelFor(0, a.height(), [&](std::int64_t y) {
-        const auto p = a.row(static_cast<int>(y)), q = b.row(static_cast<int>(y));
-        const auto to = out.row(static_cast<int>(y));
+    parallelFor(0, a.height(), [&](int y) {
+        const auto p = a.row(y), q = b.row(y);
+        const auto to = out.row(y);
         for (std::size_t x = 0; x < to.size(); ++x) {
             int most = 0;
             for (int c = 0; c < 3; ++c) most = std::max(most, std::abs(p[x][c] - q[x][c]));
@@ -49,8 +49,8 @@ void forPieces(int width, int height, const In& in, const Piece& piece) {
     const auto take = [&](int x, int y) {
         const auto i = static_cast<std::int64_t>(y) * width + x;
         if (x < 0 || y < 0 || x >= width || y >= height) return;
-        if (seen.pixels()[static_cast<std::size_t>(i)] || !in(static_cast<std::size_t>(i))) return;
-        seen.pixels()[static_cast<std::size_t>(i)] = 1;
+        if (seen.pixels()[i] || !in(static_cast<std::size_t>(i))) return;
+        seen.pixels()[i] = 1;
         pixels.push_back(i);
     };
     for (int y = 0; y < height; ++y) {
@@ -85,13 +85,13 @@ Result<Image<std::uint8_t>> foregroundMask(const Rgba8Image& background, const R
     Image<std::uint8_t> mask(width, height);
     const auto pixels = mask.pixels();
     const auto set = [&](const std::vector<std::int64_t>& piece, std::uint8_t value) {
-        for (const auto i : piece) pixels[static_cast<std::size_t>(i)] = value;
+        for (const auto i : piece) pixels[i] = value;
     };
     forPieces(
         width, height, [&](std::size_t i) { return 2 * values[i] > level; },
         [&](const std::vector<std::int64_t>& piece) {
             std::size_t sure = 0;
-            for (const auto i : piece) sure += values[static_cast<std::size_t>(i)] > level;
+            for (const auto i : piece) sure += values[i] > level;
             if (sure > speck) set(piece, 255);
         });
     forPieces(

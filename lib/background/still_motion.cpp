@@ -71,7 +71,7 @@ void MotionWindow::quantities(const LumaRows& before, const LumaRows& now, int f
         std::uint32_t* out = to.data() + static_cast<std::size_t>(y - first) * width;
         for (int x = 0; x < width_; ++x)
             out[x] = running[static_cast<std::size_t>(std::min(x + radius_, width_ - 1)) + 1] -
-                     running[static_cast<std::size_t>(std::max(x - radius_, 0))];
+                     running[std::max(x - radius_, 0)];
         change(y - radius_, ~0u);
     }
 }

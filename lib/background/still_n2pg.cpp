@@ -31,7 +31,7 @@ using Counts = std::array<std::uint32_t, kLargestDifference + 1>;
 int medianOf(const Counts& counts, std::uint64_t total) {
     std::uint64_t seen = 0;
     int v = 0;
-    while ((seen += counts[static_cast<std::size_t>(v)]) * 2 < total) ++v;
+    while ((seen += counts[v]) * 2 < total) ++v;
     return v;
 }
 
@@ -39,9 +39,7 @@ int medianOf(const Counts& counts, std::uint64_t total) {
 int stabilityThreshold(const Counts& counts, std::uint64_t total) {
     const int median = medianOf(counts, total);
     Counts deviations{};
-    for (int v = 0; v <= kLargestDifference; ++v)
-        deviations[static_cast<std::size_t>(std::abs(v - median))] +=
-            counts[static_cast<std::size_t>(v)];
+    for (int v = 0; v <= kLargestDifference; ++v) deviations[std::abs(v - median)] += counts[v];
     const double spread = std::max<double>(medianOf(deviations, total), kLeastSpread);
     return median + static_cast<int>(std::floor(kSpreads * spread));
 }
@@ -66,7 +64,7 @@ void gradientDifference(const std::uint8_t* a, const std::uint8_t* aBelow, const
 std::array<std::int16_t, 256> frameShares() {
     std::array<std::int16_t, 256> shares{};
     for (int n = 0; n < 256; ++n)
-        shares[static_cast<std::size_t>(n)] =
+        shares[n] =
             static_cast<std::int16_t>(std::min(32767, std::max(kLeastShare, 65536 / (n + 2))));
     return shares;
 }

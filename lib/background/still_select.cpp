@@ -99,8 +99,7 @@ class BandSelector {
                                                      window_.rowsNeeded(first_, rows_));
                                  }));
             if (moving) {
-                parallelFor(0, static_cast<std::int64_t>(n), [&](std::int64_t k) {
-                    const auto i = static_cast<std::size_t>(k);
+                parallelFor(0, n, [&](std::size_t i) {
                     block_[i].motion.resize(pixels_);
                     // Before the first frame there is none: it moves as the second does.
                     if (from + i == 0) return;
@@ -172,10 +171,7 @@ class BandSelector {
 
     template <class Body>
     void forPixels(const Body& body) const {
-        parallelForBlocks(0, static_cast<std::int64_t>(pixels_), kPixelsAtOnce,
-                          [&](std::int64_t from, std::int64_t to) {
-                              for (auto p = from; p < to; ++p) body(static_cast<std::size_t>(p));
-                          });
+        parallelFor(0, pixels_, kPixelsAtOnce, [&](std::size_t p) { body(p); });
     }
 
     StillFrames& frames_;

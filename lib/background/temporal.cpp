@@ -125,24 +125,20 @@ Image<std::uint8_t> TemporalBackground::Impl::movingPixels(const ReferenceView& 
     });
     const float quiet = kQuietTimes * light.noise + kQuietSteps;
     Image<std::uint8_t> moving(w, endRow() - firstRow());
-    parallelForBlocks(firstRow(), endRow(), kRows, [&](std::int64_t begin, std::int64_t end) {
-        for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
-            const int above = std::max(y - 1, from), below = std::min(y + 1, to - 1);
-            const int rowsHere = below - above + 1;
-            const std::uint16_t* a = sums.row(above - from).data();
-            const std::uint16_t* b = sums.row(below - from).data();
-            // Of three rows the middle one, of two none besides.
-            const std::uint16_t* m = sums.row(y - from).data();
-            std::uint8_t* out = moving.row(y - firstRow()).data();
-            const auto isMoving = [&](int x, int count) {
-                const int sum = rowsHere == 3   ? a[x] + m[x] + b[x]
-                                : rowsHere == 2 ? a[x] + b[x]
-                                                : m[x];
-                return static_cast<float>(sum) > quiet * static_cast<float>(count);
-            };
-            for (int x = 0; x < w; ++x) out[x] = isMoving(x, 3 * rowsHere);
-            for (const int x : {0, w - 1}) out[x] = isMoving(x, std::min(w, 2) * rowsHere);
-        }
+    parallelFor(firstRow(), endRow(), kRows, [&](int y) {
+        const int above = std::max(y - 1, from), below = std::min(y + 1, to - 1);
+        const int rowsHere = below - above + 1;
+        const std::uint16_t* a = sums.row(above - from).data();
+        const std::uint16_t* b = sums.row(below - from).data();
+        // Of three rows the middle one, of two none besides.
+        const std::uint16_t* m = sums.row(y - from).data();
+        std::uint8_t* out = moving.row(y - firstRow()).data();
+        const auto isMoving = [&](int x, int count) {
+            const int sum = rowsHere == 3 ? a[x] + m[x] + b[x] : rowsHere == 2 ? a[x] + b[x] : m[x];
+            return static_cast<float>(sum) > quiet * static_cast<float>(count);
+        };
+        for (int x = 0; x < w; ++x) out[x] = isMoving(x, 3 * rowsHere);
+        for (const int x : {0, w - 1}) out[x] = isMoving(x, std::min(w, 2) * rowsHere);
     });
     return moving;
 }
@@ -159,30 +155,27 @@ void TemporalBackground::Impl::insert(const ReferenceView& frame, const temporal
     const glm::vec3 unlit = 1.0f / light.gain;
     std::visit(
         [&](auto& all) {
-            parallelForBlocks(top, endRow(), kRows, [&](std::int64_t begin, std::int64_t end) {
-                for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
-                    for (int x = 0; x < w; ++x) {
-                        const std::size_t pixel = static_cast<std::size_t>(y) * w + x;
-                        auto& layers = all[static_cast<std::size_t>(y - top) * w + x];
-                        const float q = inverse.data()[pixel];
-                        const float alpha = alphaOf(frame, pixel);
-                        if (!(q > 0)) {
-                            if (!(alpha > 0)) ++layers.empty;
-                            continue;
-                        }
-                        Measurement m;
-                        m.q = q;
-                        m.tolerance = gauge.noise().tolerance(frame.depth.data()[pixel], step);
-                        m.weak = mixed.at(x, y - top) != 0 || alpha < kFullAlpha;
-                        const auto worth =
-                            static_cast<Worth>((m.weak ? 2 : 0) + moving.at(x, y - top));
-                        const std::uint32_t random = temporal::randomOf(pixel, frameNumber);
-                        m.key = temporal::keyOf(worth, random);
-                        m.heads = random & 1;
-                        m.time = time;
-                        m.colour = temporal::stepsOf(frame.texture, pixel) * unlit;
-                        layers.add(m);
+            parallelFor(top, endRow(), kRows, [&](int y) {
+                for (int x = 0; x < w; ++x) {
+                    const std::size_t pixel = static_cast<std::size_t>(y) * w + x;
+                    auto& layers = all[static_cast<std::size_t>(y - top) * w + x];
+                    const float q = inverse.data()[pixel];
+                    const float alpha = alphaOf(frame, pixel);
+                    if (!(q > 0)) {
+                        if (!(alpha > 0)) ++layers.empty;
+                        continue;
                     }
+                    Measurement m;
+                    m.q = q;
+                    m.tolerance = gauge.noise().tolerance(frame.depth.data()[pixel], step);
+                    m.weak = mixed.at(x, y - top) != 0 || alpha < kFullAlpha;
+                    const auto worth = static_cast<Worth>((m.weak ? 2 : 0) + moving.at(x, y - top));
+                    const std::uint32_t random = temporal::randomOf(pixel, frameNumber);
+                    m.key = temporal::keyOf(worth, random);
+                    m.heads = random & 1;
+                    m.time = time;
+                    m.colour = temporal::stepsOf(frame.texture, pixel) * unlit;
+                    layers.add(m);
                 }
             });
         },
@@ -272,14 +265,11 @@ Result<void> TemporalBackground::endPass(Job& job) {
     vote.firstTime = s.firstTime;
     std::visit(
         [&](const auto& all) {
-            parallelForBlocks(
-                s.firstRow(), s.endRow(), kRows, [&](std::int64_t from, std::int64_t to) {
-                    for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y)
-                        for (int x = 0; x < s.width(); ++x)
-                            vote.decide(
-                                all[static_cast<std::size_t>(y - s.firstRow()) * s.width() + x],
+            parallelFor(s.firstRow(), s.endRow(), kRows, [&](int y) {
+                for (int x = 0; x < s.width(); ++x)
+                    vote.decide(all[static_cast<std::size_t>(y - s.firstRow()) * s.width() + x],
                                 static_cast<std::size_t>(y) * s.width() + x, s.model, s.inFront);
-                });
+            });
         },
         s.pixels);
     ++s.pass;

@@ -15,6 +15,14 @@ void parallelFor(std::int64_t begin, std::int64_t end,
 void parallelForBlocks(std::int64_t begin, std::int64_t end, std::int64_t grain,
                        const std::function<void(std::int64_t, std::int64_t)>& body);
 
+/// As parallelFor() for short bodies: `grain` of them one after the other on a thread.
+template <class Body>
+void parallelFor(std::int64_t begin, std::int64_t end, std::int64_t grain, const Body& body) {
+    parallelForBlocks(begin, end, grain, [&](std::int64_t from, std::int64_t to) {
+        for (std::int64_t i = from; i < to; ++i) body(i);
+    });
+}
+
 /// Holds the number of threads down while it lives (`--threads`); 0 = all processors.
 class ThreadLimit {
   public:

@@ -61,6 +61,13 @@ template <class T>
     return tl::unexpected<Error>(std::move(r.error()));
 }
 
+/// The same result, its error reported from `where`.
+template <class T>
+[[nodiscard]] Result<T> within(const std::string& where, Result<T> result) {
+    if (!result) return tl::unexpected<Error>(result.error().at(where));
+    return result;
+}
+
 }  // namespace stx
 
 #define STX_CONCAT_INNER(a, b) a##b
@@ -78,4 +85,12 @@ template <class T>
     do {                                                                        \
         if (auto stxChecked = (expression); !stxChecked)                        \
             return tl::unexpected<::stx::Error>(std::move(stxChecked.error())); \
+    } while (false)
+
+/// `if (given) STX_SET(x, f());` assigns to x, or returns f()'s error, as one statement.
+#define STX_SET(to, expression)                                                      \
+    do {                                                                             \
+        auto stxSet = (expression);                                                  \
+        if (!stxSet) return tl::unexpected<::stx::Error>(std::move(stxSet.error())); \
+        to = std::move(*stxSet);                                                     \
     } while (false)

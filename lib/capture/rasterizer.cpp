@@ -548,27 +548,26 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
         }
     }
     std::atomic<bool> stopped = false;
-    parallelForBlocks(
-        0, static_cast<std::int64_t>(bins.size()), 8, [&](std::int64_t from, std::int64_t to) {
-            Tile tile;
-            for (auto i = from; i < to; ++i) {
-                if (bins[i].empty()) continue;
-                if (job.cancelled.load(std::memory_order_relaxed)) {
-                    stopped = true;
-                    return;
-                }
-                const int tx = static_cast<int>(i % tilesX), ty = static_cast<int>(i / tilesX);
-                tile.setUps.clear();
-                for (const std::uint32_t triangle : bins[i]) {
-                    SetUp s;
-                    if (setUp(triangle, settings.supersampling, s)) tile.setUps.push_back(s);
-                }
-                drawTile(tx, ty, settings.supersampling, tile);
-                shadeTile(tx, ty, settings, tile, out);
-                if (settings.supersampling > 1) drawTile(tx, ty, 1, tile);
-                resolveCentres(tx, ty, tile, out);
+    parallelForBlocks(0, bins.size(), 8, [&](std::int64_t from, std::int64_t to) {
+        Tile tile;
+        for (auto i = from; i < to; ++i) {
+            if (bins[i].empty()) continue;
+            if (job.cancelled.load(std::memory_order_relaxed)) {
+                stopped = true;
+                return;
             }
-        });
+            const int tx = static_cast<int>(i % tilesX), ty = static_cast<int>(i / tilesX);
+            tile.setUps.clear();
+            for (const std::uint32_t triangle : bins[i]) {
+                SetUp s;
+                if (setUp(triangle, settings.supersampling, s)) tile.setUps.push_back(s);
+            }
+            drawTile(tx, ty, settings.supersampling, tile);
+            shadeTile(tx, ty, settings, tile, out);
+            if (settings.supersampling > 1) drawTile(tx, ty, 1, tile);
+            resolveCentres(tx, ty, tile, out);
+        }
+    });
     if (stopped) STX_CHECK(job.checkCancelled());
     return out;
 }

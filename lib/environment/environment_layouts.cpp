@@ -14,16 +14,13 @@ template <class Colour>
 Texture pictureOf(bool linear, glm::ivec2 size, const Colour& colourOf) {
     Rgba8Image coded(linear ? 0 : size.x, linear ? 0 : size.y);
     RgbaFloatImage floats(linear ? size.x : 0, linear ? size.y : 0);
-    parallelForBlocks(0, size.y, 4, [&](std::int64_t from, std::int64_t to) {
-        for (auto y = static_cast<int>(from); y < to; ++y) {
-            for (int x = 0; x < size.x; ++x) {
-                const glm::vec4 c = colourOf(glm::dvec2((x + 0.5) / size.x, (y + 0.5) / size.y));
-                if (linear)
-                    floats.at(x, y) = c;
-                else
-                    coded.at(x, y) =
-                        glm::u8vec4(glm::clamp(c, 0.0f, 1.0f) * 255.0f + glm::vec4(0.5f));
-            }
+    parallelFor(0, size.y, 4, [&](int y) {
+        for (int x = 0; x < size.x; ++x) {
+            const glm::vec4 c = colourOf(glm::dvec2((x + 0.5) / size.x, (y + 0.5) / size.y));
+            if (linear)
+                floats.at(x, y) = c;
+            else
+                coded.at(x, y) = glm::u8vec4(glm::clamp(c, 0.0f, 1.0f) * 255.0f + glm::vec4(0.5f));
         }
     });
     if (linear) return floats;
@@ -132,9 +129,7 @@ Result<Environment> flattened(const Environment& environment, const Limits& limi
     const bool linear = environment.linear();
     Environment under = withoutPictures(environment, environment.layout);
     std::shared_ptr<const EnvironmentMap> sky;
-    if (behind) {
-        STX_TRY(sky, EnvironmentMap::make(under, limits));
-    }
+    if (behind) STX_SET(sky, EnvironmentMap::make(under, limits));
     const auto colourOf = [&](glm::dvec3 direction) {
         const glm::vec3 d = map->environmentFromWorld() * glm::vec3(direction);
         glm::vec4 c = map->pictureAt(d);

@@ -28,20 +28,17 @@ struct Piece {
 
 std::vector<Piece> piecesOf(const EnvironmentMap& map) {
     std::vector<Piece> pieces(6 * kCoarse * kCoarse);
-    parallelForBlocks(0, 6 * kCoarse, 4, [&](std::int64_t from, std::int64_t to) {
-        for (auto row = static_cast<int>(from); row < to; ++row) {
-            for (int x = 0; x < kCoarse; ++x) {
-                const glm::dvec3 d =
-                    faceDirection(static_cast<CubeFace>(row / kCoarse),
-                                  {(x + 0.5) / kCoarse, (row % kCoarse + 0.5) / kCoarse});
-                const double length = glm::length(d);
-                Piece& piece = pieces[static_cast<std::size_t>(row) * kCoarse + x];
-                piece.direction = glm::vec3(d / length);
-                piece.solidAngle =
-                    static_cast<float>(4.0 / (kCoarse * kCoarse) / (length * length * length));
-                piece.light =
-                    glm::vec3(map.sample(piece.direction, std::sqrt(piece.solidAngle), true));
-            }
+    parallelFor(0, 6 * kCoarse, 4, [&](int row) {
+        for (int x = 0; x < kCoarse; ++x) {
+            const glm::dvec3 d =
+                faceDirection(static_cast<CubeFace>(row / kCoarse),
+                              {(x + 0.5) / kCoarse, (row % kCoarse + 0.5) / kCoarse});
+            const double length = glm::length(d);
+            Piece& piece = pieces[static_cast<std::size_t>(row) * kCoarse + x];
+            piece.direction = glm::vec3(d / length);
+            piece.solidAngle =
+                static_cast<float>(4.0 / (kCoarse * kCoarse) / (length * length * length));
+            piece.light = glm::vec3(map.sample(piece.direction, std::sqrt(piece.solidAngle), true));
         }
     });
     return pieces;
@@ -60,8 +57,7 @@ std::array<glm::vec3, 9> harmonicsOf(const std::vector<Piece>& pieces) {
                                  0.315392 * (3 * z * z - 1),
                                  1.092548 * x * z,
                                  0.546274 * (x * x - y * y)};
-        for (int i = 0; i < 9; ++i)
-            sums[static_cast<std::size_t>(i)] += glm::dvec3(p.light) * (basis[i] * p.solidAngle);
+        for (int i = 0; i < 9; ++i) sums[i] += glm::dvec3(p.light) * (basis[i] * p.solidAngle);
     }
     // Lambert's cosine over pi: 1, 2/3 and 1/4 of the orders; times the basis' own constants.
     const double factors[9] = {0.282095,         0.488603 * 2 / 3, 0.488603 * 2 / 3,
@@ -78,32 +74,29 @@ Environment lobesOf(const std::vector<Piece>& pieces, float shininess) {
     constexpr int kSteps = 4096;
     std::vector<float> power(kSteps + 2);
     for (int i = 0; i <= kSteps + 1; ++i)
-        power[static_cast<std::size_t>(i)] =
-            std::pow(std::min(1.0f, static_cast<float>(i) / kSteps), shininess);
+        power[i] = std::pow(std::min(1.0f, static_cast<float>(i) / kSteps), shininess);
     const float least = std::pow(kLeastWeight, 1.0f / shininess);
     Environment lobes;
     for (int f = 0; f < 6; ++f) {
         RgbaFloatImage face(kCoarse, kCoarse);
-        parallelForBlocks(0, kCoarse, 1, [&](std::int64_t from, std::int64_t to) {
-            for (auto y = static_cast<int>(from); y < to; ++y) {
-                for (int x = 0; x < kCoarse; ++x) {
-                    const glm::vec3 d(glm::normalize(faceDirection(
-                        static_cast<CubeFace>(f), {(x + 0.5) / kCoarse, (y + 0.5) / kCoarse})));
-                    glm::vec3 sum(0.0f);
-                    float weights = 0;
-                    for (const Piece& p : pieces) {
-                        const float cosine = glm::dot(d, p.direction);
-                        if (cosine < least) continue;
-                        const float at = std::min(cosine, 1.0f) * kSteps;
-                        const auto i = static_cast<std::size_t>(at);
-                        const float w =
-                            (power[i] + (power[i + 1] - power[i]) * (at - static_cast<float>(i))) *
-                            p.solidAngle;
-                        sum += p.light * w;
-                        weights += w;
-                    }
-                    face.at(x, y) = glm::vec4(sum / weights, 1.0f);
+        parallelFor(0, kCoarse, 1, [&](int y) {
+            for (int x = 0; x < kCoarse; ++x) {
+                const glm::vec3 d(glm::normalize(faceDirection(
+                    static_cast<CubeFace>(f), {(x + 0.5) / kCoarse, (y + 0.5) / kCoarse})));
+                glm::vec3 sum(0.0f);
+                float weights = 0;
+                for (const Piece& p : pieces) {
+                    const float cosine = glm::dot(d, p.direction);
+                    if (cosine < least) continue;
+                    const float at = std::min(cosine, 1.0f) * kSteps;
+                    const auto i = static_cast<std::size_t>(at);
+                    const float w =
+                        (power[i] + (power[i + 1] - power[i]) * (at - static_cast<float>(i))) *
+                        p.solidAngle;
+                    sum += p.light * w;
+                    weights += w;
                 }
+                face.at(x, y) = glm::vec4(sum / weights, 1.0f);
             }
         });
         lobes.pictures.emplace_back(std::move(face));
@@ -128,7 +121,7 @@ std::vector<glm::vec3> tableOf(const EnvironmentMap& lobes) {
 struct Harmonics {
     const std::array<glm::vec3, 9>& values;
     using vec3 = glsl::vec3;
-    [[nodiscard]] vec3 harmonic(int i) const { return values[static_cast<std::size_t>(i)]; }
+    [[nodiscard]] vec3 harmonic(int i) const { return values[i]; }
 #include "shaders/shared/environment_light.glsl"
 };
 

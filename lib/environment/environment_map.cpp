@@ -137,18 +137,16 @@ Share shareOf(int i, int from, int to) {
 template <class P>
 Level<P> halved(const Level<P>& large) {
     Level<P> small(std::max(1, large.width / 2), std::max(1, large.height / 2));
-    parallelForBlocks(0, small.height, 8, [&](std::int64_t from, std::int64_t to) {
-        for (auto y = static_cast<int>(from); y < to; ++y) {
-            const Share rows = shareOf(y, large.height, small.height);
-            for (int x = 0; x < small.width; ++x) {
-                const Share columns = shareOf(x, large.width, small.width);
-                glm::vec4 light(0.0f);
-                for (int j = 0; j < rows.count; ++j)
-                    for (int i = 0; i < columns.count; ++i)
-                        light += lightOf(large.at(columns.first + i, rows.first + j)) *
-                                 (rows.weights[j] * columns.weights[i]);
-                fromLight(light, small.at(x, y));
-            }
+    parallelFor(0, small.height, 8, [&](int y) {
+        const Share rows = shareOf(y, large.height, small.height);
+        for (int x = 0; x < small.width; ++x) {
+            const Share columns = shareOf(x, large.width, small.width);
+            glm::vec4 light(0.0f);
+            for (int j = 0; j < rows.count; ++j)
+                for (int i = 0; i < columns.count; ++i)
+                    light += lightOf(large.at(columns.first + i, rows.first + j)) *
+                             (rows.weights[j] * columns.weights[i]);
+            fromLight(light, small.at(x, y));
         }
     });
     return small;
@@ -281,7 +279,7 @@ Place latlongPlace(glm::vec3 d) {
 
 template <class P>
 glm::vec4 filtered(const Pyramids<P>& pictures, const Place& at, float texels) {
-    const auto& levels = pictures.faces[at.face];
+    const auto& levels = pictures.faces[static_cast<std::size_t>(at.face)];
     if (levels.empty()) return glm::vec4(0.0f);
     glm::vec4 p;
     if (!(texels > 1.0f) || levels.size() == 1) {

@@ -58,7 +58,7 @@ Warp warpFrom(const glm::dmat4& m) {
     Warp w;
     for (int row = 0; row < 4; ++row)
         for (int column = 0; column < 4; ++column)
-            w.m[static_cast<std::size_t>(row * 4 + column)] = static_cast<float>(m[column][row]);
+            w.m[row * 4 + column] = static_cast<float>(m[column][row]);
     return w;
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "lib/base/parallel.hpp"
+#include "lib/base/parallel_try.hpp"
 
 namespace stx {
 namespace {
@@ -196,13 +196,10 @@ Result<std::vector<Camera>> layoutCameras(const ViewLayout& layout, const ViewFr
     }
     const bool tight = !isGrid(layout.kind);
     std::vector<Camera> cameras(directions.size());
-    std::vector<Result<Camera>> results(directions.size(), Camera());
-    parallelFor(0, static_cast<std::int64_t>(directions.size()), [&](std::int64_t i) {
-        results[i] = frameCamera(directions[i], framing, points, sphere, tight);
-    });
-    for (std::size_t i = 0; i < results.size(); ++i) {
-        STX_TRY(cameras[i], std::move(results[i]));
-    }
+    STX_CHECK(parallelTry(0, directions.size(), [&](std::size_t i) -> Result<void> {
+        STX_TRY(cameras[i], frameCamera(directions[i], framing, points, sphere, tight));
+        return {};
+    }));
     return cameras;
 }
 

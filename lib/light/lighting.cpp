@@ -14,9 +14,7 @@ struct Phong {
     [[nodiscard]] vec3 specularLight() const { return lighting.specular; }
     [[nodiscard]] float shininess() const { return lighting.shininess; }
     [[nodiscard]] int lightCount() const { return static_cast<int>(lighting.lights.size()); }
-    [[nodiscard]] const Light& light(int i) const {
-        return lighting.lights[static_cast<std::size_t>(i)];
-    }
+    [[nodiscard]] const Light& light(int i) const { return lighting.lights[i]; }
     [[nodiscard]] vec3 lightColour(int i) const { return light(i).colour; }
     [[nodiscard]] vec4 lightVector(int i) const {
         return {light(i).vector, light(i).kind == Light::Kind::point ? 1.0f : 0.0f};

@@ -84,24 +84,22 @@ Result<Comparison> compareImages(const Image<P>& a, const Image<P>& b,
     const double peak = peakOf(a, settings);
     Image<float> lumaA(a.width(), a.height()), lumaB(a.width(), a.height());
     std::vector<RowSums> rows(a.height());
-    parallelForBlocks(0, a.height(), kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            RowSums& sums = rows[y];
-            for (int x = 0; x < a.width(); ++x) {
-                const glm::vec3 ca = seenPixel(a.at(x, y), settings.background);
-                const glm::vec3 cb = seenPixel(b.at(x, y), settings.background);
-                const double ya = luma(ca), yb = luma(cb);
-                lumaA.at(x, y) = static_cast<float>(ya);
-                lumaB.at(x, y) = static_cast<float>(yb);
-                if (!counts(settings, x, y)) continue;
-                ++sums.pixels;
-                const glm::dvec3 d = glm::abs(glm::dvec3(ca) - glm::dvec3(cb));
-                const double largest = std::max({d.r, d.g, d.b});
-                if (largest > sums.worst.difference) sums.worst = {x, y, largest};
-                if (largest > 0) ++sums.different;
-                sums.rgb += d.r * d.r + d.g * d.g + d.b * d.b;
-                sums.y += (ya - yb) * (ya - yb);
-            }
+    parallelFor(0, a.height(), kRowsPerTask, [&](int y) {
+        RowSums& sums = rows[y];
+        for (int x = 0; x < a.width(); ++x) {
+            const glm::vec3 ca = seenPixel(a.at(x, y), settings.background);
+            const glm::vec3 cb = seenPixel(b.at(x, y), settings.background);
+            const double ya = luma(ca), yb = luma(cb);
+            lumaA.at(x, y) = static_cast<float>(ya);
+            lumaB.at(x, y) = static_cast<float>(yb);
+            if (!counts(settings, x, y)) continue;
+            ++sums.pixels;
+            const glm::dvec3 d = glm::abs(glm::dvec3(ca) - glm::dvec3(cb));
+            const double largest = std::max({d.r, d.g, d.b});
+            if (largest > sums.worst.difference) sums.worst = {x, y, largest};
+            if (largest > 0) ++sums.different;
+            sums.rgb += d.r * d.r + d.g * d.g + d.b * d.b;
+            sums.y += (ya - yb) * (ya - yb);
         }
     });
     RowSums all;
@@ -132,23 +130,21 @@ Result<Image<glm::u8vec4>> errorImage(const Image<P>& a, const Image<P>& b,
     STX_CHECK(checkInputs(a, b, settings));
     const double scale = gain / peakOf(a, settings);
     Image<glm::u8vec4> out(a.width(), a.height());
-    parallelForBlocks(0, a.height(), kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            for (int x = 0; x < a.width(); ++x) {
-                if (!counts(settings, x, y)) {
-                    out.at(x, y) = {0, 0, 64, 255};
-                    continue;
-                }
-                const glm::vec3 d = glm::abs(seenPixel(a.at(x, y), settings.background) -
-                                             seenPixel(b.at(x, y), settings.background));
-                // Black, red, yellow, white at 0, 1/3, 2/3, 1.
-                const double t = 3.0 * scale * std::max({d.r, d.g, d.b});
-                const auto ramp = [&](double start) {
-                    return static_cast<std::uint8_t>(
-                        std::lround(255 * std::clamp(t - start, 0.0, 1.0)));
-                };
-                out.at(x, y) = {ramp(0), ramp(1), ramp(2), 255};
+    parallelFor(0, a.height(), kRowsPerTask, [&](int y) {
+        for (int x = 0; x < a.width(); ++x) {
+            if (!counts(settings, x, y)) {
+                out.at(x, y) = {0, 0, 64, 255};
+                continue;
             }
+            const glm::vec3 d = glm::abs(seenPixel(a.at(x, y), settings.background) -
+                                         seenPixel(b.at(x, y), settings.background));
+            // Black, red, yellow, white at 0, 1/3, 2/3, 1.
+            const double t = 3.0 * scale * std::max({d.r, d.g, d.b});
+            const auto ramp = [&](double start) {
+                return static_cast<std::uint8_t>(
+                    std::lround(255 * std::clamp(t - start, 0.0, 1.0)));
+            };
+            out.at(x, y) = {ramp(0), ramp(1), ramp(2), 255};
         }
     });
     return out;

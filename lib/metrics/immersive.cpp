@@ -23,8 +23,7 @@ template <class P>
 Planes planesOf(const Image<P>& picture, const CompareSettings& settings, double peak) {
     Planes planes;
     planes.fill(Image<float>(picture.width(), picture.height()));
-    parallelFor(0, picture.height(), [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(0, picture.height(), [&](int y) {
         for (int x = 0; x < picture.width(); ++x) {
             const glm::dvec3 c =
                 glm::dvec3(metrics::seenPixel(picture.at(x, y), settings.background)) / peak;
@@ -46,8 +45,7 @@ double likestSum(const Image<float>& from, const Image<float>& to, float shift,
                  const CompareSettings& settings) {
     const int width = from.width(), height = from.height();
     std::vector<double> rows(static_cast<std::size_t>(height));
-    parallelFor(0, height, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(0, height, [&](int y) {
         std::vector<float> best(static_cast<std::size_t>(width),
                                 std::numeric_limits<float>::infinity());
         const float* a = &from.at(0, y);
@@ -57,16 +55,14 @@ double likestSum(const Image<float>& from, const Image<float>& to, float shift,
                 const int end = std::min(width, width - dx);
                 for (int x = std::max(0, -dx); x < end; ++x) {
                     const float d = a[x] + shift - b[x + dx];
-                    best[static_cast<std::size_t>(x)] =
-                        std::min(best[static_cast<std::size_t>(x)], d * d);
+                    best[x] = std::min(best[x], d * d);
                 }
             }
         }
         double sum = 0;
         for (int x = 0; x < width; ++x)
-            if (within(settings, x, y))
-                sum += static_cast<double>(best[static_cast<std::size_t>(x)]);
-        rows[static_cast<std::size_t>(y)] = sum;
+            if (within(settings, x, y)) sum += static_cast<double>(best[x]);
+        rows[y] = sum;
     });
     double sum = 0;
     for (const double row : rows) sum += row;

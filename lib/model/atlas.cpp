@@ -95,7 +95,7 @@ std::vector<std::pair<std::size_t, std::size_t>> findOverlaps(
 std::int64_t Atlas::pointCount() const {
     std::int64_t points = 0;
     for (const AtlasRectangle& r : rectangles) {
-        const Image<float>& depth = pages[static_cast<std::size_t>(r.page)].depth;
+        const Image<float>& depth = pages[r.page].depth;
         for (int y = r.atlasY; y < r.atlasY + r.atlasHeight(); ++y)
             for (int x = r.atlasX; x < r.atlasX + r.atlasWidth(); ++x)
                 points += hasPoint(depth.at(x, y)) ? 1 : 0;
@@ -155,8 +155,7 @@ Result<void> Atlas::check() const {
     if (padding < 0) return fail(ErrorCode::invalidInput, "the atlas' padding is {}", padding);
     STX_CHECK(checkObjects(objects, views.size()));
     for (std::size_t i = 0; i < views.size(); ++i) {
-        if (auto ok = views[i].camera.check(); !ok)
-            return tl::unexpected(ok.error().at(fmt::format("view {}", i)));
+        STX_CHECK(within(fmt::format("view {}", i), views[i].camera.check()));
     }
     for (std::size_t i = 0; i < pages.size(); ++i) {
         const auto& p = pages[i];

@@ -47,7 +47,7 @@ void cropPages(Atlas& atlas) {
         const glm::ivec2 corner(r.atlasX, r.atlasY), size(r.atlasWidth(), r.atlasHeight());
         box.low = glm::min(box.low, corner - atlas.padding);
         box.high = glm::max(box.high, corner + size + atlas.padding);
-        number[static_cast<std::size_t>(r.page)] = 0;
+        number[r.page] = 0;
     }
     box.low = glm::max(box.low, glm::ivec2(0));
     box.high = glm::min(box.high, glm::ivec2(atlas.width(), atlas.height()));
@@ -60,7 +60,7 @@ void cropPages(Atlas& atlas) {
     }
     atlas.pages = std::move(pages);
     for (auto& r : atlas.rectangles) {
-        r.page = number[static_cast<std::size_t>(r.page)];
+        r.page = number[r.page];
         r.atlasX -= box.low.x;
         r.atlasY -= box.low.y;
     }

@@ -96,8 +96,7 @@ std::int64_t Bundle::pointCount() const {
 
 Bounds Bundle::computeBounds() const {
     std::vector<Bounds> each(views.size());
-    parallelFor(0, static_cast<std::int64_t>(views.size()),
-                [&](std::int64_t i) { each[i] = views[i].computeBounds(); });
+    parallelFor(0, views.size(), [&](std::int64_t i) { each[i] = views[i].computeBounds(); });
     return boundsTogether(each);
 }
 
@@ -108,8 +107,7 @@ using ViewCheck = Result<void> (ReferenceView::*)() const;
 Result<void> checkViews(const std::vector<ReferenceView>& views, ViewCheck check) {
     if (views.empty()) return fail(ErrorCode::invalidInput, "the bundle has no reference view");
     for (std::size_t i = 0; i < views.size(); ++i) {
-        if (auto ok = (views[i].*check)(); !ok)
-            return tl::unexpected(ok.error().at(fmt::format("view {}", i)));
+        STX_CHECK(within(fmt::format("view {}", i), (views[i].*check)()));
         if (views[i].texture.isLinear() != views[0].texture.isLinear())
             return fail(ErrorCode::invalidInput,
                         "view {} is {} but view 0 is {}; a bundle has one colour space", i,

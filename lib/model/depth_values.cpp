@@ -171,8 +171,7 @@ Bounds boundsTogether(std::span<const Bounds> each) {
 Bounds boundsOfPoints(const Image<float>& distances, const Camera& camera) {
     const std::size_t beyond = HWY_DYNAMIC_DISPATCH(lanesOfBounds)();
     std::vector<double> columns(static_cast<std::size_t>(distances.width()) + beyond);
-    for (int x = 0; x < distances.width(); ++x)
-        columns[static_cast<std::size_t>(x)] = (x + 0.5 - camera.cx) / camera.fx;
+    for (int x = 0; x < distances.width(); ++x) columns[x] = (x + 0.5 - camera.cx) / camera.fx;
     Bounds bounds;
     HWY_DYNAMIC_DISPATCH(boundsImpl)(distances, camera, columns.data(), bounds);
     return bounds;

@@ -26,7 +26,7 @@ double medianDistance(const Atlas& atlas, std::size_t view) {
     std::vector<float> distances;
     for (const AtlasRectangle& r : atlas.rectangles) {
         if (r.view != static_cast<int>(view)) continue;
-        const Image<float>& depth = atlas.pages[static_cast<std::size_t>(r.page)].depth;
+        const Image<float>& depth = atlas.pages[r.page].depth;
         for (int y = r.atlasY; y < r.atlasY + r.atlasHeight(); ++y)
             addDistances(depth.row(y).subspan(static_cast<std::size_t>(r.atlasX),
                                               static_cast<std::size_t>(r.atlasWidth())),

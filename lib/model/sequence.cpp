@@ -50,8 +50,7 @@ class ChangedByView : public Sequence {
         STX_CHECK(checkPeak(change_.takes, bundle.views, job.limits));
         for (std::size_t i = 0; i < bundle.views.size(); ++i) {
             STX_CHECK(job.checkCancelled());
-            if (auto done = change_.change(bundle.views[i], job); !done)
-                return tl::unexpected(done.error().at(fmt::format("view {}", i)));
+            STX_CHECK(within(fmt::format("view {}", i), change_.change(bundle.views[i], job)));
         }
         return bundle;
     }

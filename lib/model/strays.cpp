@@ -26,9 +26,9 @@ Bounds coreOf(std::uint64_t count, const std::function<Piece(std::uint64_t)>& pi
         const auto left = static_cast<std::ptrdiff_t>(v.size() / 200);
         const auto right = static_cast<std::ptrdiff_t>(v.size()) - 1 - left;
         std::nth_element(v.begin(), v.begin() + left, v.end());
-        low[k] = v[static_cast<std::size_t>(left)];
+        low[k] = v[left];
         std::nth_element(v.begin(), v.begin() + right, v.end());
-        high[k] = v[static_cast<std::size_t>(right)];
+        high[k] = v[right];
     }
     core.add(low);
     core.add(high);

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <utility>
 
-#include "lib/base/parallel.hpp"
+#include "lib/base/parallel_try.hpp"
 
 namespace stx {
 
@@ -128,8 +128,7 @@ class ChangedViews : public ViewTable {
     Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
         STX_TRY(auto read, table_->view(index, job));
         auto view = ownView(std::move(read));
-        if (auto done = change_.change(*view, job); !done)
-            return tl::unexpected(done.error().at(fmt::format("view {}", index)));
+        STX_CHECK(within(fmt::format("view {}", index), change_.change(*view, job)));
         return view;
     }
 
@@ -235,7 +234,7 @@ Result<std::shared_ptr<const ReferenceView>> ViewTable::view(std::size_t index, 
     STX_TRY(auto view, make(index, job));
     if (whole_) return view;
     const auto place = [&] { return fmt::format("view {}", index); };
-    if (auto ok = view->checkHeader(); !ok) return tl::unexpected(ok.error().at(place()));
+    STX_CHECK(within(place(), view->checkHeader()));
     auto differs = difference(about_->views[index], *view, planesKnown_);
     if (differs.empty() && ViewImageKinds::of(*view) != kinds_[index])
         differs =
@@ -279,25 +278,19 @@ Result<Bundle> someViews(
     const ViewTable& table, const std::vector<bool>& wanted, PixelSpool* spool, Job& job,
     const std::function<Result<void>(std::size_t, const ReferenceView&)>& look) {
     Bundle bundle = headersOf(table.about());
-    const auto count = static_cast<std::int64_t>(table.count());
     const auto all = std::ranges::count(wanted, true);
-    std::vector<Result<void>> done(table.count());
     std::atomic<std::int64_t> finished = 0;
-    parallelFor(0, count, [&](std::int64_t i) {
-        const auto index = static_cast<std::size_t>(i);
-        if (!wanted[index]) return;
-        done[index] = [&]() -> Result<void> {
-            STX_CHECK(job.checkCancelled());
-            STX_TRY(auto view, table.view(index, job));
-            if (look) STX_CHECK(look(index, *view));
-            bundle.views[index] = std::move(*ownView(std::move(view)));
-            bundle.views[index].moveTo(spool);
-            job.progress(++finished, all, "reading views");
-            return {};
-        }();
+    const auto read = parallelTry(0, table.count(), [&](std::size_t index) -> Result<void> {
+        if (!wanted[index]) return {};
+        STX_CHECK(job.checkCancelled());
+        STX_TRY(auto view, table.view(index, job));
+        if (look) STX_CHECK(look(index, *view));
+        bundle.views[index] = std::move(*ownView(std::move(view)));
+        bundle.views[index].moveTo(spool);
+        job.progress(++finished, all, "reading views");
+        return {};
     });
-    for (Result<void>& result : done)
-        if (!result) return propagate(result);
+    STX_CHECK(read);
     return bundle;
 }
 
@@ -305,8 +298,7 @@ Result<Bundle> wholeBundle(const ViewTable& table, Job& job) {
     if (table.whole()) return table.about();
     std::uint64_t bytes = 0;
     for (std::size_t i = 0; i < table.count(); ++i) bytes += table.bytesOf(i);
-    if (auto ok = job.limits.checkAllocation(bytes, 1, "the views"); !ok)
-        return tl::unexpected(ok.error().at(table.where()));
+    STX_CHECK(within(table.where(), job.limits.checkAllocation(bytes, 1, "the views")));
     return someViews(table, std::vector<bool>(table.count(), true), nullptr, job);
 }
 
@@ -421,18 +413,12 @@ Result<void> forEachView(
     for (std::size_t first = 0; first < count; first += atOnce) {
         if (enough && enough()) return {};
         const std::size_t end = std::min<std::size_t>(first + atOnce, count);
-        std::vector<Result<void>> done(end - first);
-        parallelFor(static_cast<std::int64_t>(first), static_cast<std::int64_t>(end),
-                    [&](std::int64_t i) {
-                        const auto index = static_cast<std::size_t>(i);
-                        done[index - first] = [&]() -> Result<void> {
-                            STX_CHECK(job.checkCancelled());
-                            STX_TRY(auto view, table.view(index, job));
-                            return each(index, std::move(view));
-                        }();
-                    });
-        for (std::size_t i = first; i < end; ++i)
-            if (!done[i - first]) return propagate(done[i - first]);
+        const auto read = parallelTry(first, end, [&](std::size_t index) -> Result<void> {
+            STX_CHECK(job.checkCancelled());
+            STX_TRY(auto view, table.view(index, job));
+            return each(index, std::move(view));
+        });
+        STX_CHECK(read);
         for (std::size_t i = first; inOrder && i < end; ++i) STX_CHECK(inOrder(i));
     }
     return {};

@@ -24,7 +24,7 @@ struct CellGrid {
     /// Of views first .. first + count - 1.
     CellGrid(const Bundle& bundle, int padding, std::int64_t first, std::int64_t count) {
         for (std::int64_t i = first; i < first + count; ++i) {
-            const auto& camera = bundle.views[static_cast<std::size_t>(i)].camera;
+            const auto& camera = bundle.views[i].camera;
             cell = glm::max(cell, glm::i64vec2(camera.width, camera.height));
         }
         cell += 2 * padding;
@@ -98,8 +98,8 @@ Result<AtlasLayout> gridLayout(const Bundle& bundle, const PackSettings& setting
         layout.height = settings.powerOfTwo ? powerOfTwoFrom(size.y) : size.y;
         layout.pages = static_cast<int>(ceilDiv(views, perPage));
         for (std::int64_t i = 0; i < views; ++i) {
-            AtlasRectangle r = grid.place(bundle.views[static_cast<std::size_t>(i)].camera,
-                                          i % perPage, {0, 0}, settings.padding);
+            AtlasRectangle r =
+                grid.place(bundle.views[i].camera, i % perPage, {0, 0}, settings.padding);
             r.view = static_cast<int>(i);
             r.page = static_cast<int>(i / perPage);
             layout.rectangles.push_back(r);

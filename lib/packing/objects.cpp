@@ -154,8 +154,7 @@ Result<JoinedTables> joinTables(std::vector<PackTable> objects, Job& job) {
 Result<JoinedObjects> joinObjects(std::vector<PackObject> objects, Job& job) {
     std::vector<PackTable> tables;
     for (const PackObject& o : objects) {
-        if (const auto ok = o.bundle.check(); !ok)
-            return tl::unexpected(ok.error().at(fmt::format("object '{}'", o.name)));
+        STX_CHECK(within(fmt::format("object '{}'", o.name), o.bundle.check()));
         tables.push_back({o.name, viewsOf(o.bundle), o.sourcePixels});
     }
     STX_TRY(auto views, joinTables(std::move(tables), job));

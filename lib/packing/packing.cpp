@@ -303,8 +303,8 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
     STX_CHECK(forEachView(
         table, {"an atlas", 0}, job,
         [&](std::size_t i, const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
-            parallelFor(0, static_cast<std::int64_t>(ofView[i].size()), [&](std::int64_t k) {
-                const AtlasRectangle& r = *ofView[i][static_cast<std::size_t>(k)];
+            parallelFor(0, ofView[i].size(), [&](std::size_t k) {
+                const AtlasRectangle& r = *ofView[i][k];
                 fillPage(*view, r, settings.padding, atlas.pages[r.page]);
             });
             object[i] = objectPixels(*view);
@@ -401,7 +401,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     bundle.duration = atlas.duration;
     bundle.views.resize(atlas.views.size());
     std::vector<Image<std::uint8_t>> givenOf(atlas.views.size());
-    parallelFor(0, static_cast<std::int64_t>(atlas.views.size()), [&](std::int64_t i) {
+    parallelFor(0, atlas.views.size(), [&](std::int64_t i) {
         ReferenceView& view = bundle.views[i];
         view = withoutImages(atlas.views[i]);
         const int width = view.camera.width, height = view.camera.height;
@@ -437,7 +437,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     });
     STX_CHECK(job.checkCancelled());
     if (partial) {
-        parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
+        parallelFor(0, bundle.views.size(), [&](std::int64_t i) {
             fillOutside(atlas, givenOf[i], static_cast<std::size_t>(i), bundle.views[i].texture);
         });
     }

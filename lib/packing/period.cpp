@@ -32,8 +32,7 @@ Result<void> PackPeriod::add(const Bundle& whole, const Bundle& pruned) {
         return fail(ErrorCode::invalidInput,
                     "views come, go or change their size; frames that are packed alike have the "
                     "same views");
-    parallelFor(0, static_cast<std::int64_t>(views_.size()), [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
+    parallelFor(0, views_.size(), [&](std::size_t k) {
         View& to = views_[k];
         for (int y = 0; y < to.kept.height(); ++y) {
             for (int x = 0; x < to.kept.width(); ++x) {
@@ -50,8 +49,7 @@ PruneReport PackPeriod::prune(Bundle& frame) const {
     PruneReport report;
     report.sourcePixels = frame.pointCount();
     report.psnr = std::numeric_limits<double>::quiet_NaN();
-    parallelFor(0, static_cast<std::int64_t>(frame.views.size()), [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
+    parallelFor(0, frame.views.size(), [&](std::size_t k) {
         Image<std::uint8_t> kept = views_[k].kept;
         for (std::size_t p = 0; p < kept.count(); ++p)
             kept.data()[p] &= hasPoint(frame.views[k].depth.data()[p]) ? 1 : 0;

@@ -100,8 +100,8 @@ void giveAway(std::vector<PruneView>& views, const std::vector<int>& rank,
         if (from.partners.empty()) continue;
         Image<std::uint8_t> next = from.kept;
         const int width = next.width(), height = next.height();
-        parallelFor(0, (height + kBlock - 1) / kBlock, [&](std::int64_t row) {
-            const int y = static_cast<int>(row) * kBlock;
+        parallelFor(0, (height + kBlock - 1) / kBlock, [&](int row) {
+            const int y = row * kBlock;
             for (int x = 0; x < width; x += kBlock)
                 giveAwayBlock(views, from,
                               {x, y, std::min(x + kBlock, width), std::min(y + kBlock, height)},
@@ -122,7 +122,7 @@ Ring nextRing(const std::vector<PruneView>& views) {
     Ring ring;
     ring.kept.resize(views.size());
     std::vector<std::int64_t> added(views.size(), 0);
-    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
+    parallelFor(0, views.size(), [&](std::int64_t i) {
         const PruneView& v = views[i];
         const int width = v.kept.width(), height = v.kept.height();
         ring.kept[i] = v.kept;
@@ -477,10 +477,8 @@ Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& jo
 }
 
 void applyPruning(const Pruning& pruning, Bundle& bundle) {
-    parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
-        keepOnly(pruning.kept[static_cast<std::size_t>(i)],
-                 bundle.views[static_cast<std::size_t>(i)]);
-    });
+    parallelFor(0, bundle.views.size(),
+                [&](std::size_t i) { keepOnly(pruning.kept[i], bundle.views[i]); });
 }
 
 std::unique_ptr<ViewTable> prunedViews(std::unique_ptr<ViewTable> table, Pruning pruning) {

@@ -179,7 +179,7 @@ std::vector<Attempt> explore(const Problem& problem, bool turn, std::int64_t wor
     std::vector<Attempt> tried;
     for (std::size_t i = 0; i < attempts.size(); i += static_cast<std::size_t>(every))
         tried.push_back(std::move(attempts[i]));
-    parallelForBlocks(0, static_cast<std::int64_t>(tried.size()), 16, [&](auto from, auto to) {
+    parallelForBlocks(0, tried.size(), 16, [&](auto from, auto to) {
         Skyline skyline(problem.groups);
         std::vector<int> left;
         for (auto i = from; i < to; ++i)
@@ -237,7 +237,7 @@ std::optional<Attempt> bestPage(const Problem& problem, bool turn, std::int64_t 
     if (!problem.done(starts[0])) {
         if (starts.size() > 4) starts.resize(4);
         const auto share = work / 2 / static_cast<std::int64_t>(starts.size());
-        parallelFor(0, static_cast<std::int64_t>(starts.size()), [&](std::int64_t i) {
+        parallelFor(0, starts.size(), [&](std::int64_t i) {
             improve(problem, share, 0x51ed2701u + static_cast<std::uint64_t>(i), starts[i]);
         });
     }

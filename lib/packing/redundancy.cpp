@@ -180,7 +180,7 @@ std::vector<int> partnersOfBlock(const std::vector<PruneView>& views, const Prun
     const auto corners = cornersOf(from, block);
     if (!corners) return out;
     for (const int j : from.partners)
-        if (mayFallOnKept(views[static_cast<std::size_t>(j)], *corners)) out.push_back(j);
+        if (mayFallOnKept(views[j], *corners)) out.push_back(j);
     return out;
 }
 
@@ -205,7 +205,7 @@ PruneView preparePruning(const ReferenceView& view) {
 }
 
 void findPartners(std::vector<PruneView>& views, const std::vector<int>& rank) {
-    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
+    parallelFor(0, views.size(), [&](std::int64_t i) {
         PruneView& p = views[i];
         for (const int j : rank) {
             // What shows now and what is remembered must not replace each other.
@@ -271,7 +271,7 @@ Replacement findReplacement(const PruneView& from, const PrunePixel& source, con
     const double steps = 0.5 * (from.step + to.step) * (b.orthographic ? 1.0 : wz * wz);
     for (int k = 0; k < 4; ++k) {
         const int px = x0 + (k & 1), py = y0 + (k >> 1);
-        const PruneView::Surfel& surfel = to.surfels[places[static_cast<std::size_t>(k)]];
+        const PruneView::Surfel& surfel = to.surfels[places[k]];
         const glm::dvec2 g = surfel.gradient;
         const double predicted = surfel.w + g.x * (fx - px) + g.y * (fy - py);
         if (std::abs(predicted - wz) > share + steps + 0.5 * (std::abs(g.x) + std::abs(g.y)))
@@ -288,8 +288,7 @@ Replacement findReplacement(const PruneView& from, const PrunePixel& source, con
     if (!(high - low < kBridged * (b.orthographic ? std::max(high, to.worldRadius) : high)))
         return r;
     const int nx = static_cast<int>(pixel.x), ny = static_cast<int>(pixel.y);
-    const PruneView::Surfel& nearest =
-        to.surfels[places[static_cast<std::size_t>(nx - x0 + 2 * (ny - y0))]];
+    const PruneView::Surfel& nearest = to.surfels[places[nx - x0 + 2 * (ny - y0)]];
     if (rateAt(to, nx, ny, nearest) * settings.rateTolerance * settings.rateTolerance < source.rate)
         return r;
     const auto tx = static_cast<float>(fx - x0), ty = static_cast<float>(fy - y0);

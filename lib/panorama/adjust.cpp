@@ -114,10 +114,10 @@ void addSide(Block& block, glm::dmat3 worldFromFrom, glm::dmat3 worldFromTo, glm
         const glm::dvec3 byRay(byPlane.x / z, byPlane.y / z, glm::dot(byPlane, plane) / z);
         // ray = R_to^T (1 + [w_from] - [w_to]) world
         const glm::dvec3 byTurn = glm::cross(world, worldFromTo * byRay);
-        auto& own = j[static_cast<std::size_t>(row)];
+        auto& own = j[row];
         for (int i = 0; i < 3; ++i) {
-            own[static_cast<std::size_t>(i)] = fromIsA ? byTurn[i] : -byTurn[i];
-            own[kTurnOfB + static_cast<std::size_t>(i)] = -own[static_cast<std::size_t>(i)];
+            own[i] = fromIsA ? byTurn[i] : -byTurn[i];
+            own[kTurnOfB + static_cast<std::size_t>(i)] = -own[i];
         }
         const double byFrom = (seen[1][row] - seen[0][row]) / (s.pixel * kSmallStep);
         // The distortion stays where it is in the picture.
@@ -138,14 +138,14 @@ void addSide(Block& block, glm::dmat3 worldFromFrom, glm::dmat3 worldFromTo, glm
 std::vector<Block> blocksOf(const TurnModel& model, const std::vector<Pair>& pairs,
                             const AdjustSettings& s, bool derive) {
     std::vector<Block> blocks(pairs.size());
-    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
-        const Pair& pair = pairs[static_cast<std::size_t>(i)];
+    parallelFor(0, pairs.size(), [&](std::size_t i) {
+        const Pair& pair = pairs[i];
         const auto a = static_cast<std::size_t>(pair.a), b = static_cast<std::size_t>(pair.b);
         if (!model.known[a] || !model.known[b]) return;
         const glm::dmat3 ra = glm::mat3_cast(model.worldFromCamera[a]);
         const glm::dmat3 rb = glm::mat3_cast(model.worldFromCamera[b]);
         const Lenses la = lensesOf(model, pair.a), lb = lensesOf(model, pair.b);
-        Block& block = blocks[static_cast<std::size_t>(i)];
+        Block& block = blocks[i];
         for (const Match& m : pair.matches) {
             addSide(block, ra, rb, m.a, m.b, true, la, lb, s, derive);
             addSide(block, rb, ra, m.b, m.a, false, lb, la, s, derive);
@@ -306,8 +306,8 @@ double adjust(TurnModel& model, const std::vector<Pair>& pairs, const AdjustSett
 }
 
 std::optional<glm::dvec2> seenBy(const TurnModel& model, int a, int b, glm::dvec2 p) {
-    const auto& from = model.worldFromCamera[static_cast<std::size_t>(a)];
-    const auto& to = model.worldFromCamera[static_cast<std::size_t>(b)];
+    const auto& from = model.worldFromCamera[a];
+    const auto& to = model.worldFromCamera[b];
     return model.lensOf(b).position(glm::inverse(to) * (from * model.lensOf(a).ray(p)));
 }
 

@@ -19,7 +19,7 @@ struct TurnModel {
     /// The lens of one picture. What it distorts stays where it is in the picture.
     [[nodiscard]] TurnLens lensOf(int k) const {
         if (stretch.empty()) return lens;
-        const double factor = std::exp(stretch[static_cast<std::size_t>(k)]);
+        const double factor = std::exp(stretch[k]);
         return {lens.focal * factor, lens.k1 * factor * factor};
     }
 };

@@ -135,7 +135,7 @@ auto findSame(Pairs& pairs, const Pair& pair) {
 bool dropWrongPairs(Series& s) {
     const auto before = s.pairs.size();
     std::erase_if(s.pairs, [&](const Pair& pair) {
-        const bool known = s.model.known[static_cast<std::size_t>(pair.a)];
+        const bool known = s.model.known[pair.a];
         return known && medianDifference(s, pair) > kWrongPairPixels;
     });
     return s.pairs.size() != before;
@@ -143,8 +143,8 @@ bool dropWrongPairs(Series& s) {
 
 /// Whether two pictures may see the same, by the model.
 bool mayOverlap(const Series& s, int a, int b) {
-    const auto& copy = s.copies[static_cast<std::size_t>(a)];
-    const glm::dvec2 other = s.copies[static_cast<std::size_t>(b)].extent(), own = copy.extent();
+    const auto& copy = s.copies[a];
+    const glm::dvec2 other = s.copies[b].extent(), own = copy.extent();
     int seen = 0;
     constexpr int kMiddle = kGridOfOverlap / 2;
     for (int y = 0; y < kGridOfOverlap; ++y)
@@ -165,9 +165,7 @@ Result<void> matchPatches(Series& s, const std::vector<Pair>& fromFeatures,
     const auto count = static_cast<int>(s.copies.size());
     for (int a = 0; a < count; ++a)
         for (int b = a + 1; b < count; ++b) {
-            if (!s.model.known[static_cast<std::size_t>(a)] ||
-                !s.model.known[static_cast<std::size_t>(b)] || !mayOverlap(s, a, b))
-                continue;
+            if (!s.model.known[a] || !s.model.known[b] || !mayOverlap(s, a, b)) continue;
             if (std::find(forbidden.begin(), forbidden.end(), std::pair(a, b)) != forbidden.end())
                 continue;
             Pair pair;
@@ -178,9 +176,9 @@ Result<void> matchPatches(Series& s, const std::vector<Pair>& fromFeatures,
     std::atomic<std::int64_t> done = 0;
     PatchSettings settings;
     settings.reach = reach;
-    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
+    parallelFor(0, pairs.size(), [&](std::size_t i) {
         if (job.cancelled) return;
-        Pair& pair = pairs[static_cast<std::size_t>(i)];
+        Pair& pair = pairs[i];
         const auto a = static_cast<std::size_t>(pair.a), b = static_cast<std::size_t>(pair.b);
         pair.matches =
             alignPatches(s.copies, s.pyramids, s.features, s.model, pair.a, pair.b, settings);
@@ -271,8 +269,7 @@ void describePairs(const Series& s, const std::vector<Pair>& before, PanoramaAli
     std::size_t all = 0;
     for (const Pair& pair : s.pairs) {
         const double fullPixel =
-            0.5 * (s.copies[static_cast<std::size_t>(pair.a)].fullHalfDiagonal() +
-                   s.copies[static_cast<std::size_t>(pair.b)].fullHalfDiagonal());
+            0.5 * (s.copies[pair.a].fullHalfDiagonal() + s.copies[pair.b].fullHalfDiagonal());
         const auto differences = [&](const Pair& of) {
             std::vector<double> values = differencesOf(s, of, 1.0);
             for (double& value : values) value *= fullPixel;
@@ -333,7 +330,7 @@ Result<std::vector<int>> readPictures(PictureSource& source, Series& s, Job& job
     STX_TRY(auto twins, sameAs(s.copies, job));
     std::vector<std::string> equal;
     for (int k = 0; k < count; ++k)
-        if (twins[static_cast<std::size_t>(k)] >= 0) equal.push_back(source.name(k));
+        if (twins[k] >= 0) equal.push_back(source.name(k));
     if (static_cast<int>(equal.size()) == count - 1)
         return fail(ErrorCode::invalidInput,
                     "all {} pictures are equal; a camera that turned between them is needed",
@@ -344,9 +341,9 @@ Result<std::vector<int>> readPictures(PictureSource& source, Series& s, Job& job
 
     s.features.resize(s.copies.size());
     std::atomic<std::int64_t> done = 0;
-    parallelFor(0, count, [&](std::int64_t i) {
+    parallelFor(0, count, [&](std::size_t i) {
         if (job.cancelled) return;
-        const auto k = static_cast<std::size_t>(i);
+        const auto k = i;
         const std::size_t most =
             std::clamp(s.copies[k].grey.count() / kPixelsOfFeature, kFewestFeatures, kMostFeatures);
         if (twins[k] < 0) s.features[k] = findFeatures(s.copies[k], static_cast<int>(most));
@@ -380,9 +377,9 @@ double gapOf(const TurnModel& model, const std::vector<Pair>& pairs,
     double gap = 0, sum = 0, all = 0;
     std::size_t most = 0;
     for (const int p : closing) {
-        const Pair& pair = pairs[static_cast<std::size_t>(p)];
-        const auto& a = model.worldFromCamera[static_cast<std::size_t>(pair.a)];
-        const auto& b = model.worldFromCamera[static_cast<std::size_t>(pair.b)];
+        const Pair& pair = pairs[p];
+        const auto& a = model.worldFromCamera[pair.a];
+        const auto& b = model.worldFromCamera[pair.b];
         const double off = angleBetween(
             turnOf(pair.matches, model.lensOf(pair.a), model.lensOf(pair.b), pair.bFromA),
             glm::inverse(b) * a);
@@ -457,7 +454,7 @@ Result<Start> startByFeatures(Series& s, const PanoramaSettings& settings, doubl
         if (!settings.closeLoop) {
             const auto closing = pairsThatClose(tree, s.pairs, s.model);
             for (auto p = closing.rbegin(); p != closing.rend(); ++p) {
-                const Pair& pair = s.pairs[static_cast<std::size_t>(*p)];
+                const Pair& pair = s.pairs[*p];
                 start.forbidden.emplace_back(pair.a, pair.b);
                 s.pairs.erase(s.pairs.begin() + *p);
             }
@@ -476,8 +473,7 @@ Result<Start> startByFeatures(Series& s, const PanoramaSettings& settings, doubl
 Result<std::vector<Pair>> adjustByPatches(Series& s, const Start& start, bool focalGiven,
                                           Job& job) {
     s.pyramids.resize(s.copies.size());
-    parallelFor(0, static_cast<std::int64_t>(s.copies.size()), [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
+    parallelFor(0, s.copies.size(), [&](std::size_t k) {
         if (s.model.known[k]) s.pyramids[k] = pyramidOf(s.copies[k].grey);
     });
     std::vector<Pair> all;

@@ -95,7 +95,7 @@ class Drawn {
             const float wy = cubic((static_cast<float>(y) - py) / wide_);
             const auto row = copy_.colour.row(std::clamp(y, 0, h - 1));
             for (int x = x0; x <= x1; ++x) {
-                const glm::u8vec4 c = row[static_cast<std::size_t>(std::clamp(x, 0, w - 1))];
+                const glm::u8vec4 c = row[std::clamp(x, 0, w - 1)];
                 sum +=
                     wy * cubic((static_cast<float>(x) - px) / wide_) * glm::vec4(c.r, c.g, c.b, 1);
             }
@@ -260,8 +260,7 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
                     continue;
                 }
                 const auto [weight, factor] = around.at(static_cast<float>(cx - whole));
-                if (weight > 0)
-                    pixels.add(x, turns[static_cast<std::size_t>(x - left)], weight, factor);
+                if (weight > 0) pixels.add(x, turns[x - left], weight, factor);
             }
             pixels.find(picture, std::sin(latitude), std::cos(latitude));
             const auto to = sums.row(y - top);
@@ -273,8 +272,7 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
                                     vignetting.clearing(picture.radius2(pixels.x[i], pixels.y[i])));
                 light = withGain(light, gain) * pixels.factor[i];
                 const int x = pixels.column[i];
-                to[static_cast<std::size_t>((x % width + width) % width)] +=
-                    pixels.weight[i] * glm::vec4(light, 1);
+                to[(x % width + width) % width] += pixels.weight[i] * glm::vec4(light, 1);
             }
         }
     });
@@ -305,7 +303,7 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
     clearVignetting(prints, alignment.vignetting);
     const auto gains = findGains(prints, gridWidth);
     for (std::size_t i = 0; i < prints.size(); ++i)
-        alignment.cameras[static_cast<std::size_t>(prints[i].picture)].gain = gains[i];
+        alignment.cameras[prints[i].picture].gain = gains[i];
     STX_TRY(const auto labels, findSeams(prints, gains, gridWidth, settings.hideSeams, job));
     const auto corrections = findCorrections(prints, gains, labels);
 
@@ -335,7 +333,7 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
             const GridBox& box = prints[k].box;
             if (box.y + box.height < from || box.y > to) continue;
             STX_TRY(auto picture, source.picture(prints[k].picture));
-            const auto& camera = alignment.cameras[static_cast<std::size_t>(prints[k].picture)];
+            const auto& camera = alignment.cameras[prints[k].picture];
             if (picture.size() != camera.size)
                 return fail(ErrorCode::io, "'{}' changed while it was read",
                             source.name(prints[k].picture));
@@ -344,9 +342,9 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
                  width, top, sums);
         }
         const Srgb8Tables& tables = srgb8Tables();
-        parallelFor(0, sums.height(), [&](std::int64_t y) {
-            const auto fromRow = sums.row(static_cast<int>(y));
-            const auto toRow = out.pixels.row(top + static_cast<int>(y));
+        parallelFor(0, sums.height(), [&](int y) {
+            const auto fromRow = sums.row(y);
+            const auto toRow = out.pixels.row(top + y);
             for (std::size_t x = 0; x < toRow.size(); ++x) {
                 const glm::vec4 s = fromRow[x];
                 if (s.a <= kLeastCoverage) continue;

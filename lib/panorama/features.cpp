@@ -150,7 +150,7 @@ std::vector<Feature> cornersOf(const Image<float>& strength, std::size_t most) {
             f.pixel = {x + 0.5f + peakOf(strength.at(x - 1, y), s, strength.at(x + 1, y)),
                        y + 0.5f + peakOf(strength.at(x, y - 1), s, strength.at(x, y + 1))};
             f.strength = s;
-            cells[static_cast<std::size_t>(y * kCells / h * kCells + x * kCells / w)].push_back(f);
+            cells[y * kCells / h * kCells + x * kCells / w].push_back(f);
         }
     }
     const auto stronger = [](const Feature& a, const Feature& b) {
@@ -234,20 +234,17 @@ std::vector<float> directionsOf(const Gradients& g, glm::vec2 pixel) {
             if (r2 > kReach * kReach) continue;
             const auto i = static_cast<std::size_t>((dy + kReach) * kWidth + dx + kReach);
             const float turn = around.turn[i] * kBins;
-            const float weight = around.length[i] * weights[static_cast<std::size_t>(r2)];
+            const float weight = around.length[i] * weights[r2];
             const auto bin = static_cast<int>(turn);
             const float t = turn - static_cast<float>(bin);
-            bins[static_cast<std::size_t>(bin % kBins)] += weight * (1 - t);
-            bins[static_cast<std::size_t>((bin + 1) % kBins)] += weight * t;
+            bins[bin % kBins] += weight * (1 - t);
+            bins[(bin + 1) % kBins] += weight * t;
         }
     }
-    const auto at = [&](const auto& b, int i) {
-        return b[static_cast<std::size_t>((i + kBins) % kBins)];
-    };
+    const auto at = [&](const auto& b, int i) { return b[(i + kBins) % kBins]; };
     for (int pass = 0; pass < 2; ++pass) {
         for (int i = 0; i < kBins; ++i)
-            smooth[static_cast<std::size_t>(i)] =
-                0.25f * at(bins, i - 1) + 0.5f * at(bins, i) + 0.25f * at(bins, i + 1);
+            smooth[i] = 0.25f * at(bins, i - 1) + 0.5f * at(bins, i) + 0.25f * at(bins, i + 1);
         bins = smooth;
     }
     const float highest = *std::max_element(bins.begin(), bins.end());
@@ -273,7 +270,7 @@ std::array<Sharing, kSamples * kSamples> sharings() {
     std::array<Sharing, kSamples * kSamples> out;
     for (int j = 0; j < kSamples; ++j)
         for (int i = 0; i < kSamples; ++i) {
-            Sharing& s = out[static_cast<std::size_t>(j * kSamples + i)];
+            Sharing& s = out[j * kSamples + i];
             const float cx = (static_cast<float>(i) + 0.5f) / kCellSamples - 0.5f;
             const float cy = (static_cast<float>(j) + 0.5f) / kCellSamples - 0.5f;
             const int x = static_cast<int>(std::floor(cx)), y = static_cast<int>(std::floor(cy));
@@ -368,8 +365,7 @@ Features findFeatures(const WorkCopy& copy, int most) {
         if (std::min(image.width(), image.height()) < 3 * kMargin) break;
         const Gradients gradients = gradientsOf(image);
         const auto corners =
-            cornersOf(cornerStrength(gradients),
-                      static_cast<std::size_t>(most * kShares[static_cast<std::size_t>(level)]));
+            cornersOf(cornerStrength(gradients), static_cast<std::size_t>(most * kShares[level]));
         const glm::vec2 scale = glm::vec2(copy.grey.size()) / glm::vec2(image.size());
         for (const Feature& corner : corners) {
             for (const float direction : directionsOf(gradients, corner.pixel)) {

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <cmath>
 
-#include "lib/base/parallel.hpp"
+#include "lib/base/parallel_try.hpp"
 #include "lib/model/srgb8.hpp"
 #include "lib/panorama/kernels.hpp"
 #include "lib/panorama/work_copy.hpp"
@@ -88,8 +88,7 @@ Footprint footprintOf(Rgba8Image picture, const PanoramaCamera& camera, const Tu
         row.cosine = std::cos(latitude);
         positionsOf(row, px.data(), py.data());
         for (int x = 0; x < f.box.width; ++x) {
-            const glm::dvec2 pixel(px[static_cast<std::size_t>(x)],
-                                   py[static_cast<std::size_t>(x)]);
+            const glm::dvec2 pixel(px[x], py[x]);
             const glm::dvec2 p = glm::abs(2.0 * pixel / row.size - 1.0) * extent;
             const glm::dvec2 inner = extent - p;
             const double border = std::min(inner.x, inner.y);
@@ -155,31 +154,25 @@ Result<std::vector<Footprint>> footprintsOf(PictureSource& source,
         if (alignment.cameras[k].used) used.push_back(static_cast<int>(k));
     std::uint64_t cells = 0;
     for (const int k : used) {
-        const PanoramaCamera& camera = alignment.cameras[static_cast<std::size_t>(k)];
+        const PanoramaCamera& camera = alignment.cameras[k];
         const GridBox box = boxOf(camera, lensOf(alignment, camera), gridWidth);
         cells += static_cast<std::uint64_t>(box.width) * static_cast<std::uint64_t>(box.height);
     }
     STX_CHECK(
         job.limits.checkAllocation(cells, 3 * sizeof(glm::vec3) + kOtherBytes, "finding seams"));
     std::vector<Footprint> out(used.size());
-    std::vector<Result<void>> made(used.size());
     std::atomic<std::int64_t> done = 0;
     const auto count = static_cast<std::int64_t>(used.size());
-    parallelFor(0, count, [&](std::int64_t i) {
-        if (job.cancelled) return;
-        const auto at = static_cast<std::size_t>(i);
-        auto picture = source.picture(used[at]);
-        if (!picture) {
-            made[at] = propagate(picture);
-            return;
-        }
-        const PanoramaCamera& camera = alignment.cameras[static_cast<std::size_t>(used[at])];
-        out[at] = footprintOf(std::move(*picture), camera, lensOf(alignment, camera), gridWidth);
+    const auto made = parallelTry(0, count, [&](std::size_t at) -> Result<void> {
+        STX_CHECK(job.checkCancelled());
+        STX_TRY(auto picture, source.picture(used[at]));
+        const PanoramaCamera& camera = alignment.cameras[used[at]];
+        out[at] = footprintOf(std::move(picture), camera, lensOf(alignment, camera), gridWidth);
         out[at].picture = used[at];
         job.progress(++done, count, "laying out pictures");
+        return {};
     });
-    STX_CHECK(job.checkCancelled());
-    for (auto& one : made) STX_CHECK(std::move(one));
+    STX_CHECK(made);
     return out;
 }
 

@@ -36,7 +36,7 @@ LeftOutPicture compared(const WorkCopy& copy, const PanoramaCamera& camera, cons
     std::vector<RowSums> rows(static_cast<std::size_t>(height));
     parallelFor(0, height, [&](std::int64_t row) {
         const auto y = static_cast<int>(row);
-        RowSums& sums = rows[static_cast<std::size_t>(row)];
+        RowSums& sums = rows[row];
         for (int x = 0; x < width; ++x) {
             glm::vec4& c = seen.at(x, y);
             const glm::dvec2 p = copy.position({x + 0.5, y + 0.5});

@@ -34,16 +34,16 @@ void smooth(Image<glm::vec4>& image, int radius, bool around) {
     const auto run = [&](int count, bool closed, const auto& at) {
         for (int i = -radius; i <= count + radius; ++i) {
             const bool inside = i >= 0 && i < count;
-            line[static_cast<std::size_t>(i + radius)] = inside   ? at(i)
-                                                         : closed ? at((i % count + count) % count)
-                                                                  : glm::vec4(0);
+            line[i + radius] = inside   ? at(i)
+                               : closed ? at((i % count + count) % count)
+                                        : glm::vec4(0);
         }
         glm::dvec4 sum(0);
-        for (int i = 0; i < 2 * radius; ++i) sum += glm::dvec4(line[static_cast<std::size_t>(i)]);
+        for (int i = 0; i < 2 * radius; ++i) sum += glm::dvec4(line[i]);
         for (int i = 0; i < count; ++i) {
-            sum += glm::dvec4(line[static_cast<std::size_t>(i + 2 * radius)]);
+            sum += glm::dvec4(line[i + 2 * radius]);
             at(i) = glm::vec4(sum / (2.0 * radius + 1));
-            sum -= glm::dvec4(line[static_cast<std::size_t>(i)]);
+            sum -= glm::dvec4(line[i]);
         }
     };
     for (int pass = 0; pass < kBoxes; ++pass) {
@@ -155,8 +155,7 @@ std::vector<glm::dvec3> findGains(const std::vector<Footprint>& prints, int grid
         double weight;
     };
     std::vector<std::vector<Ratio>> rows(n);
-    parallelFor(0, static_cast<std::int64_t>(n), [&](std::int64_t i) {
-        const auto a = static_cast<std::size_t>(i);
+    parallelFor(0, n, [&](std::size_t a) {
         for (std::size_t b = a + 1; b < n; ++b) {
             if (!boxesMeet(prints[a], prints[b], gridWidth)) continue;
             std::array<std::vector<float>, 3> logs;
@@ -169,14 +168,12 @@ std::vector<glm::dvec3> findGains(const std::vector<Footprint>& prints, int grid
                         : prints[a].clearing.at(pa.x, pa.y) / prints[b].clearing.at(pb.x, pb.y);
                 for (int c = 0; c < 3; ++c)
                     if (std::min(ca[c], cb[c]) > kDarkest && std::max(ca[c], cb[c]) < kLightest)
-                        logs[static_cast<std::size_t>(c)].push_back(
-                            std::log(ca[c] / cb[c] * clearing));
+                        logs[c].push_back(std::log(ca[c] / cb[c] * clearing));
             });
             if (std::min({logs[0].size(), logs[1].size(), logs[2].size()}) < kFewestShared)
                 continue;
             Ratio ratio{a, b, {}, std::sqrt(static_cast<double>(logs[1].size()))};
-            for (int c = 0; c < 3; ++c)
-                ratio.log[c] = medianOf(std::move(logs[static_cast<std::size_t>(c)]));
+            for (int c = 0; c < 3; ++c) ratio.log[c] = medianOf(std::move(logs[c]));
             rows[a].push_back(ratio);
         }
     });
@@ -207,8 +204,7 @@ std::vector<Image<glm::vec3>> findCorrections(const std::vector<Footprint>& prin
     const int gridWidth = labels.width();
     std::vector<Image<glm::vec3>> logs(n), out(n);
     std::vector<Image<float>> weights(n);
-    parallelFor(0, static_cast<std::int64_t>(n), [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
+    parallelFor(0, n, [&](std::size_t k) {
         logs[k] = logsOf(prints[k], gains[k]);
         weights[k] = weightsOf(prints[k], static_cast<int>(k), labels);
     });
@@ -216,8 +212,7 @@ std::vector<Image<glm::vec3>> findCorrections(const std::vector<Footprint>& prin
     // picture weighs more the nearer the place is to the part of it that is shown. Differences
     // are smoothed before they are weighed, so that all pictures come to the same light and no
     // step is seen where one of them ends.
-    parallelFor(0, static_cast<std::int64_t>(n), [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
+    parallelFor(0, n, [&](std::size_t k) {
         const Footprint& f = prints[k];
         Image<glm::vec4> sums(f.box.width, f.box.height);
         for (std::size_t p = 0; p < sums.count(); ++p)

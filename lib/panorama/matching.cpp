@@ -107,9 +107,8 @@ std::vector<Match> matchFeatures(const WorkCopy& copyA, const Features& a, const
                 }
                 if (d >= mine.next) continue;
                 // The same corner on another level, or turned, is not another corner.
-                const bool same =
-                    mine.at >= 0 && glm::distance(b.points[static_cast<std::size_t>(mine.at)].pixel,
-                                                  b.points[j].pixel) < kSameCorner;
+                const bool same = mine.at >= 0 && glm::distance(b.points[mine.at].pixel,
+                                                                b.points[j].pixel) < kSameCorner;
                 if (d < mine.distance) {
                     if (!same) mine.next = mine.distance;
                     mine.distance = d;
@@ -123,11 +122,11 @@ std::vector<Match> matchFeatures(const WorkCopy& copyA, const Features& a, const
     std::vector<Match> matches;
     for (std::size_t i = 0; i < best.size(); ++i) {
         const Best& m = best[i];
-        if (m.at < 0 || nearestOfB[static_cast<std::size_t>(m.at)] != static_cast<int>(i)) continue;
+        if (m.at < 0 || nearestOfB[m.at] != static_cast<int>(i)) continue;
         // Where b has no other feature, nothing can be mistaken for it.
         if (m.next < kFarDescriptors && m.distance * 100 > m.next * kRatioPercent) continue;
-        matches.push_back({copyA.position(a.points[i].pixel),
-                           copyB.position(b.points[static_cast<std::size_t>(m.at)].pixel)});
+        matches.push_back(
+            {copyA.position(a.points[i].pixel), copyB.position(b.points[m.at].pixel)});
     }
     // One match for each place.
     std::vector<Match> single;
@@ -151,10 +150,9 @@ glm::dquat turnOf(const std::vector<Match>& matches, const TurnLens& lensA, cons
             const glm::dvec3 here = turn * a;
             const glm::dvec3 moment = glm::cross(here, b);
             for (int i = 0; i < 3; ++i) {
-                right[static_cast<std::size_t>(i)] += moment[i];
+                right[i] += moment[i];
                 for (int j = 0; j < 3; ++j)
-                    matrix[static_cast<std::size_t>(3 * i + j)] +=
-                        (i == j ? 1.0 : 0.0) - here[i] * here[j];
+                    matrix[3 * i + j] += (i == j ? 1.0 : 0.0) - here[i] * here[j];
             }
         }
         if (!solveSymmetric(matrix, right)) break;
@@ -231,9 +229,9 @@ Result<PairSearch> searchPairs(const std::vector<WorkCopy>& copies,
     std::vector<std::vector<Match>> matches(all.size());
     std::vector<std::vector<Pair>> found(all.size());
     std::atomic<std::int64_t> done = 0;
-    parallelFor(0, static_cast<std::int64_t>(all.size()), [&](std::int64_t i) {
+    parallelFor(0, all.size(), [&](std::size_t i) {
         if (job.cancelled) return;
-        const auto k = static_cast<std::size_t>(i);
+        const auto k = i;
         const auto a = static_cast<std::size_t>(all[k].first);
         const auto b = static_cast<std::size_t>(all[k].second);
         matches[k] = matchFeatures(copies[a], features[a], copies[b], features[b]);

@@ -16,17 +16,17 @@ std::vector<bool> MaxFlow::sinkSide() {
     using Edge = boost::graph_traits<Graph>::edge_descriptor;
     const auto source = static_cast<int>(surplus_.size()), sink = source + 1;
     for (int n = 0; n < source; ++n) {
-        const float surplus = surplus_[static_cast<std::size_t>(n)];
+        const float surplus = surplus_[n];
         if (surplus > 0) addArcs(source, n, surplus);
         if (surplus < 0) addArcs(n, sink, -surplus);
     }
     // Sorted by the node that they leave, as the graph keeps them.
     std::vector<int> next(surplus_.size() + 2, 0);
-    for (const Arc& arc : arcs_) ++next[static_cast<std::size_t>(arc.from)];
+    for (const Arc& arc : arcs_) ++next[arc.from];
     std::exclusive_scan(next.begin(), next.end(), next.begin(), 0);
     std::vector<int> places;
     places.reserve(arcs_.size());
-    for (const Arc& arc : arcs_) places.push_back(next[static_cast<std::size_t>(arc.from)]++);
+    for (const Arc& arc : arcs_) places.push_back(next[arc.from]++);
     std::vector<std::pair<int, int>> ends(arcs_.size());
     std::vector<float> capacity(arcs_.size()), rest(arcs_.size());
     std::vector<Edge> reverse(arcs_.size());

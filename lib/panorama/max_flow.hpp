@@ -11,7 +11,7 @@ class MaxFlow {
     explicit MaxFlow(int nodes) : surplus_(static_cast<std::size_t>(nodes), 0.0f) {}
     /// Adds capacities from the source to a node, and from it to the sink.
     void addTerminal(int node, float fromSource, float toSink) {
-        surplus_[static_cast<std::size_t>(node)] += fromSource - toSink;
+        surplus_[node] += fromSource - toSink;
     }
     /// Adds a capacity from one node to another. Not negative.
     void addEdge(int from, int to, float capacity) { addArcs(from, to, capacity); }

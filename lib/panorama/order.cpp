@@ -32,9 +32,9 @@ glm::dvec3 anyAcross(glm::dvec3 direction) {
 /// The relative turn that the matches of a pair say, to its second picture from its first.
 std::vector<glm::dquat> turnsOf(const std::vector<Pair>& pairs, const TurnLens& lens) {
     std::vector<glm::dquat> turns(pairs.size());
-    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
-        const Pair& pair = pairs[static_cast<std::size_t>(i)];
-        turns[static_cast<std::size_t>(i)] = turnOf(pair.matches, lens, pair.bFromA);
+    parallelFor(0, pairs.size(), [&](std::size_t i) {
+        const Pair& pair = pairs[i];
+        turns[i] = turnOf(pair.matches, lens, pair.bFromA);
     });
     return turns;
 }
@@ -50,7 +50,7 @@ TurnModel chainOf(const PictureTree& tree, const std::vector<Pair>& pairs,
         model.known[i] = true;
         if (tree.parent[i] < 0) continue;
         const auto p = static_cast<std::size_t>(tree.pair[i]);
-        const auto& before = model.worldFromCamera[static_cast<std::size_t>(tree.parent[i])];
+        const auto& before = model.worldFromCamera[tree.parent[i]];
         const glm::dquat& bFromA = turns[p];
         // worldFromB = worldFromA aFromB
         model.worldFromCamera[i] =
@@ -81,7 +81,7 @@ PictureTree treeOf(int pictures, const std::vector<Pair>& pairs) {
     std::vector<int> group(count);
     std::iota(group.begin(), group.end(), 0);
     const auto rootOf = [&](int k) {
-        while (group[static_cast<std::size_t>(k)] != k) k = group[static_cast<std::size_t>(k)];
+        while (group[k] != k) k = group[k];
         return k;
     };
     PictureTree tree;
@@ -91,37 +91,35 @@ PictureTree treeOf(int pictures, const std::vector<Pair>& pairs) {
     for (const std::size_t p : strongest) {
         const int a = rootOf(pairs[p].a), b = rootOf(pairs[p].b);
         if (a == b) continue;
-        group[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+        group[std::max(a, b)] = std::min(a, b);
         tree.inTree[p] = true;
     }
     std::vector<std::size_t> members(count, 0);
-    for (int k = 0; k < pictures; ++k) ++members[static_cast<std::size_t>(rootOf(k))];
+    for (int k = 0; k < pictures; ++k) ++members[rootOf(k)];
     const auto largest =
         static_cast<int>(std::max_element(members.begin(), members.end()) - members.begin());
     // The root is the picture with the most matches: the middle of the whole, more or less.
     std::vector<std::size_t> weight(count, 0);
     for (const Pair& pair : pairs) {
-        weight[static_cast<std::size_t>(pair.a)] += pair.matches.size();
-        weight[static_cast<std::size_t>(pair.b)] += pair.matches.size();
+        weight[pair.a] += pair.matches.size();
+        weight[pair.b] += pair.matches.size();
     }
     int root = -1;
     for (int k = 0; k < pictures; ++k)
-        if (rootOf(k) == largest && (root < 0 || weight[static_cast<std::size_t>(k)] >
-                                                     weight[static_cast<std::size_t>(root)]))
-            root = k;
+        if (rootOf(k) == largest && (root < 0 || weight[k] > weight[root])) root = k;
     tree.order.push_back(root);
     std::vector<bool> reached(count, false);
-    reached[static_cast<std::size_t>(root)] = true;
+    reached[root] = true;
     for (std::size_t at = 0; at < tree.order.size(); ++at) {
         for (std::size_t p = 0; p < pairs.size(); ++p) {
             if (!tree.inTree[p]) continue;
             const int here = tree.order[at];
             if (pairs[p].a != here && pairs[p].b != here) continue;
             const int other = pairs[p].a == here ? pairs[p].b : pairs[p].a;
-            if (reached[static_cast<std::size_t>(other)]) continue;
-            reached[static_cast<std::size_t>(other)] = true;
-            tree.parent[static_cast<std::size_t>(other)] = here;
-            tree.pair[static_cast<std::size_t>(other)] = static_cast<int>(p);
+            if (reached[other]) continue;
+            reached[other] = true;
+            tree.parent[other] = here;
+            tree.pair[other] = static_cast<int>(p);
             tree.order.push_back(other);
         }
     }
@@ -151,7 +149,7 @@ double focalByClosing(const PictureTree& tree, const std::vector<Pair>& pairs, d
             cost +=
                 std::min(off, kMostOff) * std::sqrt(static_cast<double>(pairs[p].matches.size()));
         }
-        costs[static_cast<std::size_t>(i + kSteps)] = cost;
+        costs[i + kSteps] = cost;
     });
     const auto least = std::min_element(costs.begin(), costs.end());
     const double start = costs[kSteps];
@@ -225,15 +223,13 @@ std::vector<int> pairsThatClose(const PictureTree& tree, const std::vector<Pair>
                                 const TurnModel& model) {
     const glm::dvec3 up = upOf(model);
     const glm::dvec3 zero = anyAcross(up);
-    const auto forward = [&](int k) {
-        return model.worldFromCamera[static_cast<std::size_t>(k)] * glm::dvec3(0, 0, -1);
-    };
+    const auto forward = [&](int k) { return model.worldFromCamera[k] * glm::dvec3(0, 0, -1); };
     // How far each picture is turned from the root, along the tree.
     std::vector<double> turned(tree.parent.size(), 0.0);
     for (const int k : tree.order) {
         const auto i = static_cast<std::size_t>(k);
         if (tree.parent[i] < 0) continue;
-        turned[i] = turned[static_cast<std::size_t>(tree.parent[i])] +
+        turned[i] = turned[tree.parent[i]] +
                     wrapped(yawOf(forward(k), up, zero) - yawOf(forward(tree.parent[i]), up, zero));
     }
     std::vector<int> closing;

@@ -30,8 +30,7 @@ glm::vec4 PanoramaImage::sample(glm::dvec3 direction) const {
         for (int i = 0; i < 4; ++i) {
             const int x = ((x0 - 1 + i + (beyond ? width() / 2 : 0)) % width() + width()) % width();
             const glm::u8vec4 c = pixels.at(x, y);
-            const float w = wx[static_cast<std::size_t>(i)] * wy[static_cast<std::size_t>(j)] *
-                            (static_cast<float>(c.a) / 255.0f);
+            const float w = wx[i] * wy[j] * (static_cast<float>(c.a) / 255.0f);
             sum += w * glm::vec4(glm::vec3(c.r, c.g, c.b) / 255.0f, 1);
         }
     }

@@ -101,7 +101,7 @@ double moveOnLevel(const Image<float>& a, const Image<float>& b, double scale, P
     Window target;
     for (int y = 0; y < kSide; ++y)
         for (int x = 0; x < kSide; ++x)
-            target.values[static_cast<std::size_t>(y * kSide + x)] =
+            target.values[y * kSide + x] =
                 between(a, static_cast<float>(from.x) + static_cast<float>(x - kRadius),
                         static_cast<float>(from.y) + static_cast<float>(y - kRadius));
     target.measure();
@@ -122,16 +122,13 @@ double moveOnLevel(const Image<float>& a, const Image<float>& b, double scale, P
                 const auto dx = static_cast<float>(x - kRadius - 1);
                 const glm::vec2 p =
                     glm::vec2(to) + dx * (right + dx * xx + dy * xy) + dy * (down + dy * yy);
-                wide[static_cast<std::size_t>(y * kWide + x)] = between(b, p.x, p.y);
+                wide[y * kWide + x] = between(b, p.x, p.y);
             }
         }
-        const auto at = [&](int x, int y) {
-            return wide[static_cast<std::size_t>((y + 1) * kWide + x + 1)];
-        };
+        const auto at = [&](int x, int y) { return wide[(y + 1) * kWide + x + 1]; };
         Window seen;
         for (int y = 0; y < kSide; ++y)
-            for (int x = 0; x < kSide; ++x)
-                seen.values[static_cast<std::size_t>(y * kSide + x)] = at(x, y);
+            for (int x = 0; x < kSide; ++x) seen.values[y * kSide + x] = at(x, y);
         seen.measure();
         if (seen.deviation < kFlatInOther) return 0;
         const float gain = target.deviation / seen.deviation;
@@ -173,7 +170,7 @@ std::optional<PatchMove> expected(const WorkCopy& a, const WorkCopy& b, const Tu
         const glm::dvec2 p = pixel + kStep * glm::dvec2(i % 3 - 1, i / 3 - 1);
         const auto s = seenBy(model, ia, ib, a.position(p));
         if (!s) return std::nullopt;
-        seen[static_cast<std::size_t>(i)] = b.pixel(*s);
+        seen[i] = b.pixel(*s);
     }
     const double square = kStep * kStep;
     return PatchMove{
@@ -231,9 +228,7 @@ std::vector<Match> alignPatches(const std::vector<WorkCopy>& copies,
                 if (level == 2 && s.reach < kNeedsCoarsest) continue;
                 const double scale = std::ldexp(1.0, -level);
                 PatchMove tried = move;
-                correlation =
-                    moveOnLevel(pyramids[f][static_cast<std::size_t>(level)],
-                                pyramids[t][static_cast<std::size_t>(level)], scale, tried);
+                correlation = moveOnLevel(pyramids[f][level], pyramids[t][level], scale, tried);
                 // Coarse levels may see nothing where fine ones do.
                 if (correlation > kAlikeOnCoarse) move = tried;
                 if (level > 0) correlation = 1;

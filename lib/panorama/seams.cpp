@@ -61,8 +61,7 @@ class SeamGrid {
         // Differences are seen in coded colours.
         coded_.resize(prints.size());
         cost_.resize(prints.size());
-        parallelFor(0, static_cast<std::int64_t>(prints.size()), [&](std::int64_t i) {
-            const auto k = static_cast<std::size_t>(i);
+        parallelFor(0, prints.size(), [&](std::size_t k) {
             const Footprint& f = prints[k];
             coded_[k] = Image<glm::vec3>(f.box.width, f.box.height, glm::vec3(0));
             cost_[k] = Image<float>(f.box.width, f.box.height, 0.0f);
@@ -87,8 +86,7 @@ class SeamGrid {
     /// Makes what shows a mover cost more, where another picture does not show it.
     void avoidMovers() {
         std::vector<Image<float>> movers(prints_.size());
-        parallelFor(0, static_cast<std::int64_t>(prints_.size()), [&](std::int64_t i) {
-            const auto k = static_cast<std::size_t>(i);
+        parallelFor(0, prints_.size(), [&](std::size_t k) {
             const Footprint& f = prints_[k];
             movers[k] = Image<float>(f.box.width, f.box.height, 0.0f);
             std::vector<float> found;
@@ -407,8 +405,8 @@ Result<Image<int>> findSeams(const std::vector<Footprint>& prints,
         const auto total = static_cast<std::int64_t>(prints.size()) * kRounds;
         for (int round = 0; round < kRounds; ++round)
             for (const auto& group : groups) {
-                parallelFor(0, static_cast<std::int64_t>(group.size()), [&](std::int64_t i) {
-                    const std::size_t k = group[static_cast<std::size_t>(i)];
+                parallelFor(0, group.size(), [&](std::size_t i) {
+                    const std::size_t k = group[i];
                     changed[k] = !job.cancelled && open[k] && grid.expand(k);
                     job.progress(++done, total, "finding seams");
                 });

@@ -76,8 +76,7 @@ VignettingFit fitVignetting(const std::vector<std::vector<LightRatio>>& pairs, H
     VignettingFit fit;
     const auto measure = [&] {
         std::vector<std::vector<double>> off(pairs.size());
-        parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
-            const auto p = static_cast<std::size_t>(i);
+        parallelFor(0, pairs.size(), [&](std::size_t p) {
             std::vector<double> left;
             for (const LightRatio& r : pairs[p])
                 if (counts(r)) left.push_back(r.log - glm::dot(fit.law, r.powers));
@@ -97,8 +96,7 @@ VignettingFit fitVignetting(const std::vector<std::vector<LightRatio>>& pairs, H
     for (int round = 0; round < kFitRounds && !flat; ++round) {
         const double scale = std::max(kScaleOfMedian * fit.off, kLeastScale);
         std::vector<Sums> sums(pairs.size());
-        parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
-            const auto p = static_cast<std::size_t>(i);
+        parallelFor(0, pairs.size(), [&](std::size_t p) {
             Sums& s = sums[p];
             for (const LightRatio& r : pairs[p]) {
                 if (!counts(r)) continue;
@@ -144,8 +142,7 @@ Vignetting findVignetting(const std::vector<Footprint>& prints, int gridWidth) {
         for (std::size_t b = a + 1; b < prints.size(); ++b)
             if (boxesMeet(prints[a], prints[b], gridWidth)) both.emplace_back(a, b);
     std::vector<std::vector<LightRatio>> pairs(both.size());
-    parallelFor(0, static_cast<std::int64_t>(both.size()), [&](std::int64_t i) {
-        const auto p = static_cast<std::size_t>(i);
+    parallelFor(0, both.size(), [&](std::size_t p) {
         pairs[p] = ratiosOf(prints[both[p].first], prints[both[p].second], gridWidth);
     });
     std::size_t cells = 0;
@@ -169,8 +166,8 @@ Vignetting findVignetting(const std::vector<Footprint>& prints, int gridWidth) {
 
 void clearVignetting(std::vector<Footprint>& prints, const Vignetting& vignetting) {
     if (vignetting.none()) return;
-    parallelFor(0, static_cast<std::int64_t>(prints.size()), [&](std::int64_t i) {
-        Footprint& f = prints[static_cast<std::size_t>(i)];
+    parallelFor(0, prints.size(), [&](std::size_t i) {
+        Footprint& f = prints[i];
         f.clearing = Image<float>(f.box.width, f.box.height, 1.0f);
         for (std::size_t p = 0; p < f.clearing.count(); ++p)
             f.clearing.pixels()[p] = vignetting.clearing(f.radius2.pixels()[p]);

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <cmath>
 
-#include "lib/base/parallel.hpp"
+#include "lib/base/parallel_try.hpp"
 
 namespace stx::panorama {
 namespace {
@@ -32,19 +32,15 @@ Result<std::vector<WorkCopy>> readWorkCopies(PictureSource& source, Job& job) {
                     "--max-memory",
                     count, job.limits.maxMemoryBytes >> 20);
     std::vector<WorkCopy> copies(static_cast<std::size_t>(count));
-    std::vector<Result<void>> read(static_cast<std::size_t>(count));
     std::atomic<std::int64_t> done = 0;
-    parallelFor(0, count, [&](std::int64_t i) {
-        if (job.cancelled) return;
-        auto picture = source.picture(static_cast<int>(i));
-        if (!picture)
-            read[static_cast<std::size_t>(i)] = propagate(picture);
-        else
-            copies[static_cast<std::size_t>(i)] = makeWorkCopy(std::move(*picture), side);
+    const auto read = parallelTry(0, count, [&](int i) -> Result<void> {
+        STX_CHECK(job.checkCancelled());
+        STX_TRY(auto picture, source.picture(i));
+        copies[i] = makeWorkCopy(std::move(picture), side);
         job.progress(++done, count, "reading pictures");
+        return {};
     });
-    STX_CHECK(job.checkCancelled());
-    for (auto& one : read) STX_CHECK(std::move(one));
+    STX_CHECK(read);
     return copies;
 }
 

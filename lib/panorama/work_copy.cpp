@@ -34,7 +34,7 @@ Rgba8Image reduced(const Rgba8Image& picture, int width, int height) {
                 const int end2 = std::min(picture.width(), static_cast<int>(std::ceil(right)));
                 glm::vec3 sum(0);
                 for (int column = static_cast<int>(left); column < end2; ++column)
-                    sum += share(left, right, column) * sums[static_cast<std::size_t>(column)];
+                    sum += share(left, right, column) * sums[column];
                 out.at(x, y) = glm::u8vec4(
                     glm::clamp(sum / static_cast<float>(sx * sy) + 0.5f, 0.0f, 255.0f), 255);
             }

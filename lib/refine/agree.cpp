@@ -67,8 +67,8 @@ std::pair<Image<float>, float> moved(std::span<const NoisyView> views, std::size
             const float value = q + sum / weight;
             if (value > 0.0f) out.at(x, y) = value;
             const double scale = axis.relativeScale(q);
-            left[static_cast<std::size_t>(y)] += 1.0 / (weight * scale * scale);
-            ++points[static_cast<std::size_t>(y)];
+            left[y] += 1.0 / (weight * scale * scale);
+            ++points[y];
         }
     });
     const auto mean = meanOfRows(left, points);

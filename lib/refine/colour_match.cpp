@@ -282,8 +282,8 @@ std::vector<ColourMap> matchColours(std::size_t views, std::span<const SharedCol
         ColourMap map;
         bool moves = false, fits = true;
         for (int c = 0; c < 3; ++c) {
-            const double gain = channels[static_cast<std::size_t>(c)].gain[v];
-            const double offset = channels[static_cast<std::size_t>(c)].offset[v];
+            const double gain = channels[c].gain[v];
+            const double offset = channels[c].offset[v];
             map.gain[c] = static_cast<float>(1 + share * (gain - 1));
             map.offset[c] = static_cast<float>(share * offset);
             moves =

@@ -31,12 +31,10 @@ constexpr float kFarthestMove = 1.0f;
 /// How light the pixels of a view are, 0..1; below 0 where something else shows through.
 Image<float> lightnessOf(const NoisyView& view) {
     Image<float> out(view.q->width(), view.q->height());
-    parallelForBlocks(0, out.height(), 32, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y) {
-            for (int x = 0; x < out.width(); ++x) {
-                const glm::vec4 c = view.texture->at(x, y);
-                out.at(x, y) = c.a >= 1.0f ? 0.25f * (c.r + 2 * c.g + c.b) : -1.0f;
-            }
+    parallelFor(0, out.height(), 32, [&](int y) {
+        for (int x = 0; x < out.width(); ++x) {
+            const glm::vec4 c = view.texture->at(x, y);
+            out.at(x, y) = c.a >= 1.0f ? 0.25f * (c.r + 2 * c.g + c.b) : -1.0f;
         }
     });
     return out;
@@ -109,34 +107,32 @@ Image<float> matched(std::span<const NoisyView> views, std::span<const Image<flo
             pulls.at(x, y) = sum;
         }
     });
-    parallelForBlocks(0, out.height(), 16, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y) {
-            for (int x = 0; x < out.width(); ++x) {
-                const float q = view.q->at(x, y), own = view.surface.at(x, y).z;
-                if (!(q > 0.0f) || !(own > 0.0f)) continue;
-                const glm::vec3 plane = view.surface.at(x, y);
-                Pull sum;
-                for (int v = std::max(y - kWindow, 0); v <= std::min(y + kWindow, out.height() - 1);
-                     ++v) {
-                    for (int u = std::max(x - kWindow, 0);
-                         u <= std::min(x + kWindow, out.width() - 1); ++u) {
-                        const float there = view.q->at(u, v);
-                        if (!(there > 0.0f)) continue;
-                        const float off = there - q - plane.x * static_cast<float>(u - x) -
-                                          plane.y * static_cast<float>(v - y);
-                        if (std::abs(off) > kWindowBand * own) continue;
-                        sum.slope += pulls.at(u, v).slope;
-                        sum.curvature += pulls.at(u, v).curvature;
-                    }
+    parallelFor(0, out.height(), 16, [&](int y) {
+        for (int x = 0; x < out.width(); ++x) {
+            const float q = view.q->at(x, y), own = view.surface.at(x, y).z;
+            if (!(q > 0.0f) || !(own > 0.0f)) continue;
+            const glm::vec3 plane = view.surface.at(x, y);
+            Pull sum;
+            for (int v = std::max(y - kWindow, 0); v <= std::min(y + kWindow, out.height() - 1);
+                 ++v) {
+                for (int u = std::max(x - kWindow, 0); u <= std::min(x + kWindow, out.width() - 1);
+                     ++u) {
+                    const float there = view.q->at(u, v);
+                    if (!(there > 0.0f)) continue;
+                    const float off = there - q - plane.x * static_cast<float>(u - x) -
+                                      plane.y * static_cast<float>(v - y);
+                    if (std::abs(off) > kWindowBand * own) continue;
+                    sum.slope += pulls.at(u, v).slope;
+                    sum.curvature += pulls.at(u, v).curvature;
                 }
-                const float scale = axis.relativeScale(q), doubt = own / scale;
-                // The depth that was measured is as likely as its doubt says.
-                const float prior = kColourNoise * kColourNoise / (doubt * doubt);
-                const float move = -sum.slope / (sum.curvature + prior);
-                const float most = kFarthestMove * doubt;
-                const float value = q + scale * std::clamp(move, -most, most);
-                if (value > 0.0f) out.at(x, y) = value;
             }
+            const float scale = axis.relativeScale(q), doubt = own / scale;
+            // The depth that was measured is as likely as its doubt says.
+            const float prior = kColourNoise * kColourNoise / (doubt * doubt);
+            const float move = -sum.slope / (sum.curvature + prior);
+            const float most = kFarthestMove * doubt;
+            const float value = q + scale * std::clamp(move, -most, most);
+            if (value > 0.0f) out.at(x, y) = value;
         }
     });
     return out;

@@ -199,23 +199,21 @@ Image<float> changed(const EdgeView& view, Change change, std::span<const glm::i
     for (const glm::ivec2 p : stay) stays.at(p.x, p.y) = 1;
     const Edges edges(from, view);
     Image<float> out = from;
-    parallelForBlocks(0, from.height(), 16, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y) {
-            for (int x = 0; x < from.width(); ++x) {
-                const float here = from.at(x, y);
-                if (!(here > 0.0f)) continue;
-                if (change == Change::nearest) {
-                    out.at(x, y) = edges.nearestAround(x, y);
-                    continue;
-                }
-                const int i = edges.behind(x, y, 8);
-                if (i >= 0 && (stays.at(x, y) || edges.ownShare(x, y, i).value_or(0) > kOwnColour))
-                    continue;
-                if (change == Change::everywhere)
-                    out.at(x, y) = edges.farthestAround(x, y);
-                else if (i >= 0)
-                    out.at(x, y) = edges.goesOn(x, y, i);
+    parallelFor(0, from.height(), 16, [&](int y) {
+        for (int x = 0; x < from.width(); ++x) {
+            const float here = from.at(x, y);
+            if (!(here > 0.0f)) continue;
+            if (change == Change::nearest) {
+                out.at(x, y) = edges.nearestAround(x, y);
+                continue;
             }
+            const int i = edges.behind(x, y, 8);
+            if (i >= 0 && (stays.at(x, y) || edges.ownShare(x, y, i).value_or(0) > kOwnColour))
+                continue;
+            if (change == Change::everywhere)
+                out.at(x, y) = edges.farthestAround(x, y);
+            else if (i >= 0)
+                out.at(x, y) = edges.goesOn(x, y, i);
         }
     });
     return out;
@@ -257,12 +255,9 @@ std::vector<float> pointsApart(std::span<const EdgeView> views,
                                const std::vector<const Image<float>*>& q) {
     const auto count = static_cast<std::int64_t>(views.size());
     std::vector<std::vector<GridPixel>> grids(views.size());
-    parallelFor(0, count, [&](std::int64_t i) {
-        grids[static_cast<std::size_t>(i)] = gridOf(*q[static_cast<std::size_t>(i)]);
-    });
+    parallelFor(0, count, [&](std::size_t i) { grids[i] = gridOf(*q[i]); });
     std::vector<std::vector<float>> found(views.size());
-    parallelFor(0, count, [&](std::int64_t number) {
-        const auto k = static_cast<std::size_t>(number);
+    parallelFor(0, count, [&](std::size_t k) {
         for (std::size_t i = 0; i < views.size(); ++i) {
             if (k == i) continue;
             const Warp warp =
@@ -410,13 +405,10 @@ bool othersShowTheFront(std::span<const EdgeView> views) {
     const std::size_t every = everyWitness(views.size());
     const auto count = static_cast<std::int64_t>(views.size());
     std::vector<std::vector<EdgePixel>> pixels(views.size());
-    parallelFor(0, count, [&](std::int64_t i) {
-        pixels[static_cast<std::size_t>(i)] = edgePixels(views[static_cast<std::size_t>(i)]);
-    });
+    parallelFor(0, count, [&](std::size_t i) { pixels[i] = edgePixels(views[i]); });
     // Each view is looked at by itself, for those that ask it: every so many.
     std::vector<Witnesses> all(views.size());
-    parallelFor(0, count, [&](std::int64_t number) {
-        const auto k = static_cast<std::size_t>(number);
+    parallelFor(0, count, [&](std::size_t k) {
         for (std::size_t i = k % every; i < views.size(); i += every)
             if (i != k) all[k].add(views[k], views[i], pixels[i]);
     });
@@ -480,13 +472,10 @@ std::vector<std::vector<glm::ivec2>> thinParts(std::span<const EdgeView> views) 
     const std::size_t every = everyWitness(views.size());
     const auto count = static_cast<std::int64_t>(views.size());
     std::vector<Untold> untold(views.size());
-    parallelFor(0, count, [&](std::int64_t i) {
-        untold[static_cast<std::size_t>(i)] = untoldOf(views[static_cast<std::size_t>(i)]);
-    });
+    parallelFor(0, count, [&](std::size_t i) { untold[i] = untoldOf(views[i]); });
     std::vector<Votes> votes;
     for (const Untold& one : untold) votes.emplace_back(one.pixels.size());
-    parallelFor(0, count, [&](std::int64_t number) {
-        const auto k = static_cast<std::size_t>(number);
+    parallelFor(0, count, [&](std::size_t k) {
         for (std::size_t i = k % every; i < views.size(); i += every)
             if (i != k) vote(views[k], views[i], untold[i].pixels, votes[i]);
     });
@@ -525,10 +514,7 @@ float colourAtEdges(std::vector<float> shares) {
 
 float colourAtEdges(std::span<const EdgeView> views) {
     std::vector<std::vector<float>> shares(views.size());
-    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
-        shares[k] = sharesAtEdges(views[k]);
-    });
+    parallelFor(0, views.size(), [&](std::size_t k) { shares[k] = sharesAtEdges(views[k]); });
     std::vector<float> all;
     for (const auto& part : shares) all.insert(all.end(), part.begin(), part.end());
     return colourAtEdges(std::move(all));

@@ -309,8 +309,7 @@ Result<std::optional<std::vector<ColourMap>>> mapsOf(std::span<const Camera> cam
 
 std::vector<ColourMap> exposureMaps(std::span<const Camera> cameras, const PartOfView& partOf) {
     const auto each = [&](const std::function<void(std::size_t)>& body) -> Result<bool> {
-        parallelFor(0, static_cast<std::int64_t>(cameras.size()),
-                    [&](std::int64_t v) { body(static_cast<std::size_t>(v)); });
+        parallelFor(0, cameras.size(), [&](std::size_t v) { body(v); });
         return true;
     };
     return **mapsOf(cameras, partOf, each, false, nullptr);  // nothing in it fails or ends
@@ -336,8 +335,7 @@ void applyMap(const ColourMap& map, int x0, int y0, int x1, int y1, Texture& tex
     for (int value = 0; value < 256; ++value) {
         const glm::vec3 c = map(glm::vec3(static_cast<float>(value) / 255.0f));
         for (int k = 0; k < 3; ++k)
-            table[static_cast<std::size_t>(k)][static_cast<std::size_t>(value)] =
-                static_cast<std::uint8_t>(std::min(c[k], 1.0f) * 255.0f + 0.5f);
+            table[k][value] = static_cast<std::uint8_t>(std::min(c[k], 1.0f) * 255.0f + 0.5f);
     }
     RefineStepReport change;
     const auto put = [&change](auto& pixel, const auto& now, double white) {

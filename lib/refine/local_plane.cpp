@@ -17,7 +17,7 @@ LocalPlane fitAround(const Image<float>& q, int x, int y, int radius, const Loca
         const auto row = q.row(ny);
         const auto dy = static_cast<float>(ny - y);
         for (int nx = x0; nx <= x1; ++nx) {
-            const float there = row[static_cast<std::size_t>(nx)];
+            const float there = row[nx];
             if (!(there > 0.0f)) continue;
             const auto dx = static_cast<float>(nx - x);
             const float above = there - near.q0;

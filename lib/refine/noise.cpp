@@ -219,33 +219,31 @@ float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm
     if (surface) *surface = Image<glm::vec3>(q.width(), q.height(), glm::vec3(0.0f));
     std::vector<double> left(static_cast<std::size_t>(q.height()), 0.0);
     std::vector<std::int64_t> points(left.size(), 0);
-    parallelForBlocks(0, q.height(), 8, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y) {
-            for (int x = 0; x < q.width(); ++x) {
-                const float here = from.at(x, y);
-                if (!(here > 0.0f)) continue;
-                const float sigma = noise * axis.relativeScale(here);
-                LocalPlane plane = planeAt(from, x, y, sigma);
-                float value = here, least = here - kAgree * sigma, most = here + kAgree * sigma;
-                float doubt = sigma;
-                glm::vec2 slope(0.0f);
-                for (const int radius : kRadii) {
-                    plane = fitAround(from, x, y, radius, plane,
-                                      (radius == kRadii[0] ? bands.first : bands.then) * sigma);
-                    const float deviation = sigma / std::sqrt(std::max(plane.alike, 1.0f));
-                    least = std::max(least, plane.q0 - kAgree * deviation);
-                    most = std::min(most, plane.q0 + kAgree * deviation);
-                    if (least > most) break;  // the surface bends
-                    value = plane.q0;
-                    slope = {plane.gx, plane.gy};
-                    doubt = deviation;
-                    if (deviation < kAim * axis.relativeScale(here)) break;
-                }
-                if (value > 0.0f) q.at(x, y) = value;
-                if (surface) surface->at(x, y) = glm::vec3(slope, doubt);
-                left[static_cast<std::size_t>(y)] += doubt / axis.relativeScale(here);
-                ++points[static_cast<std::size_t>(y)];
+    parallelFor(0, q.height(), 8, [&](int y) {
+        for (int x = 0; x < q.width(); ++x) {
+            const float here = from.at(x, y);
+            if (!(here > 0.0f)) continue;
+            const float sigma = noise * axis.relativeScale(here);
+            LocalPlane plane = planeAt(from, x, y, sigma);
+            float value = here, least = here - kAgree * sigma, most = here + kAgree * sigma;
+            float doubt = sigma;
+            glm::vec2 slope(0.0f);
+            for (const int radius : kRadii) {
+                plane = fitAround(from, x, y, radius, plane,
+                                  (radius == kRadii[0] ? bands.first : bands.then) * sigma);
+                const float deviation = sigma / std::sqrt(std::max(plane.alike, 1.0f));
+                least = std::max(least, plane.q0 - kAgree * deviation);
+                most = std::min(most, plane.q0 + kAgree * deviation);
+                if (least > most) break;  // the surface bends
+                value = plane.q0;
+                slope = {plane.gx, plane.gy};
+                doubt = deviation;
+                if (deviation < kAim * axis.relativeScale(here)) break;
             }
+            if (value > 0.0f) q.at(x, y) = value;
+            if (surface) surface->at(x, y) = glm::vec3(slope, doubt);
+            left[y] += doubt / axis.relativeScale(here);
+            ++points[y];
         }
     });
     return kDoubt * static_cast<float>(meanOfRows(left, points).value_or(0));

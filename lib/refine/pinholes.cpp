@@ -25,26 +25,24 @@ std::int64_t closeMissedPixels(Image<float>& q, const Image<std::uint8_t>& cover
     if (missed == 0) return 0;
     const Image<float> from = q;
     std::atomic<std::int64_t> closed = 0;
-    parallelForBlocks(1, q.height() - 1, 16, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y) {
-            for (int x = 1; x + 1 < q.width(); ++x) {
-                if (from.at(x, y) != 0.0f || !covered.at(x, y)) continue;
-                float around[8];
-                int count = 0;
-                for (int k = 0; k < 9; ++k) {
-                    const float there = from.at(x - 1 + k % 3, y - 1 + k / 3);
-                    if (there > 0.0f) around[count++] = there;
-                }
-                if (count < kLeastNeighbours) continue;
-                std::nth_element(around, around + count / 2, around + count);
-                const float middle = around[count / 2];
-                const float band =
-                    (kPinholeBand + kPinholeDeviations * noise) * axis.relativeScale(middle);
-                const LocalPlane plane = fitAround(from, x, y, 1, {middle}, band);
-                if (plane.points < kLeastNeighbours || !(plane.q0 > 0.0f)) continue;
-                q.at(x, y) = plane.q0;
-                ++closed;
+    parallelFor(1, q.height() - 1, 16, [&](int y) {
+        for (int x = 1; x + 1 < q.width(); ++x) {
+            if (from.at(x, y) != 0.0f || !covered.at(x, y)) continue;
+            float around[8];
+            int count = 0;
+            for (int k = 0; k < 9; ++k) {
+                const float there = from.at(x - 1 + k % 3, y - 1 + k / 3);
+                if (there > 0.0f) around[count++] = there;
             }
+            if (count < kLeastNeighbours) continue;
+            std::nth_element(around, around + count / 2, around + count);
+            const float middle = around[count / 2];
+            const float band =
+                (kPinholeBand + kPinholeDeviations * noise) * axis.relativeScale(middle);
+            const LocalPlane plane = fitAround(from, x, y, 1, {middle}, band);
+            if (plane.points < kLeastNeighbours || !(plane.q0 > 0.0f)) continue;
+            q.at(x, y) = plane.q0;
+            ++closed;
         }
     });
     return closed;

@@ -155,7 +155,7 @@ class RaisedStrip {
         const PerSurface sum = costsOf(pixel);
         for (std::size_t way = 0; way < 4; ++way) {
             if (pixel.beside[way] < 0) continue;
-            RaisedPixel& other = pixels_[static_cast<std::size_t>(pixel.beside[way])];
+            RaisedPixel& other = pixels_[pixel.beside[way]];
             PerSurface& out = other.heard[way ^ 1];
             float least = std::numeric_limits<float>::max();
             for (int l = 0; l < other.count; ++l) {
@@ -170,7 +170,7 @@ class RaisedStrip {
                 out[m] = best;
                 least = std::min(least, best);
             }
-            for (int l = 0; l < other.count; ++l) out[static_cast<std::size_t>(l)] -= least;
+            for (int l = 0; l < other.count; ++l) out[l] -= least;
         }
     }
 
@@ -229,23 +229,18 @@ void smoothSmallSteps(Image<float>& depth, int reach) {
     std::vector<float> inverse(list.size());
     const auto inverseAt = [&](int x, int y) { return 1 / depth.at(x, y); };
     for (int round = 0; round < 2 * reach; ++round) {
-        parallelForBlocks(
-            0, static_cast<std::int64_t>(list.size()), 1 << 14,
-            [&](std::int64_t from, std::int64_t to) {
-                for (std::int64_t i = from; i < to; ++i) {
-                    const auto k = static_cast<std::size_t>(i);
-                    const int x = list[k] % depth.width(), y = list[k] / depth.width();
-                    const float own = inverseAt(x, y);
-                    float sum = 0;
-                    for (const auto& [dx, dy] : kBeside) {
-                        if (!depth.contains(x + dx, y + dy) || !hasPoint(depth.at(x + dx, y + dy)))
-                            continue;
-                        const float other = inverseAt(x + dx, y + dy);
-                        if (shareApart(own, other) <= kLargestSmallStep) sum += other - own;
-                    }
-                    inverse[k] = own + sum / 8;
-                }
-            });
+        parallelFor(0, list.size(), 1 << 14, [&](std::size_t k) {
+            const int x = list[k] % depth.width(), y = list[k] / depth.width();
+            const float own = inverseAt(x, y);
+            float sum = 0;
+            for (const auto& [dx, dy] : kBeside) {
+                if (!depth.contains(x + dx, y + dy) || !hasPoint(depth.at(x + dx, y + dy)))
+                    continue;
+                const float other = inverseAt(x + dx, y + dy);
+                if (shareApart(own, other) <= kLargestSmallStep) sum += other - own;
+            }
+            inverse[k] = own + sum / 8;
+        });
         for (std::size_t k = 0; k < list.size(); ++k) depth.data()[list[k]] = 1 / inverse[k];
     }
 }
@@ -258,8 +253,8 @@ Image<float> raiseDepth(const Image<float>& depth, const Texture& picture,
     const int width = picture.width(), height = picture.height();
     Image<float> out(width, height, kNoDepth);
     // Strips are always the same ones, so that bytes do not depend on the number of threads.
-    parallelFor(0, (height + kStripRows - 1) / kStripRows, [&](std::int64_t k) {
-        const int from = static_cast<int>(k) * kStripRows, to = std::min(height, from + kStripRows);
+    parallelFor(0, (height + kStripRows - 1) / kStripRows, [&](int k) {
+        const int from = k * kStripRows, to = std::min(height, from + kStripRows);
         RaisedStrip strip(coarse, picture, std::max(0, from - kMarginRows),
                           std::min(height, to + kMarginRows));
         strip.run();

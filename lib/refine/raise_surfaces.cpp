@@ -79,8 +79,7 @@ float CoarseDepth::clampedAt(int x, int y) const {
 void CoarseDepth::findMixed() {
     static constexpr int kWays[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
     mixed_ = Image<std::uint8_t>(width(), height(), 0);
-    parallelFor(0, height(), [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(0, height(), [&](int y) {
         for (int x = 0; x < width(); ++x) {
             const float own = inverse_.at(x, y);
             if (own <= 0) continue;
@@ -103,8 +102,7 @@ void CoarseDepth::gatherColours(const Texture& picture) {
     const auto firstPixel = [](int sample, int pixels, int samples) {
         return static_cast<int>(static_cast<std::int64_t>(sample) * pixels / samples);
     };
-    parallelFor(0, height(), [&](std::int64_t row) {
-        const int cy = static_cast<int>(row);
+    parallelFor(0, height(), [&](int cy) {
         const int top = firstPixel(cy, picture.height(), height()),
                   bottom = std::max(top + 1, firstPixel(cy + 1, picture.height(), height()));
         for (int cx = 0; cx < width(); ++cx) {
@@ -219,8 +217,7 @@ SurfacesAround CoarseDepth::surfacesAround(int x, int y) const {
         out.surfaces[k] = {samples[group.to - 1].inverse, samples[group.from].inverse,
                            group.sum.plane()};
         for (std::size_t i = group.from; i < group.to; ++i)
-            out.of[static_cast<std::size_t>((samples[i].y + kRaiseReach) * kRaiseSide +
-                                            samples[i].x + kRaiseReach)] =
+            out.of[(samples[i].y + kRaiseReach) * kRaiseSide + samples[i].x + kRaiseReach] =
                 static_cast<std::uint8_t>(k);
     }
     return out;
@@ -244,15 +241,13 @@ std::array<float, kRaisedSurfaces> CoarseDepth::costs(const SurfacesAround& arou
         const Colours& own = colours_.at(middle.x + x - kRaiseReach, middle.y + y - kRaiseReach);
         const glm::vec3 off = colour - own.mean;
         const float like = own.norm * std::exp(-0.5f * glm::dot(off * off, own.sharpness));
-        const float weight =
-            nearX[static_cast<std::size_t>(x)] * nearY[static_cast<std::size_t>(y)];
+        const float weight = nearX[x] * nearY[y];
         alike[k] += weight * (like + kAnyColour);
         total += weight * (like + kAnyColour);
         near[k] += weight;
         mattes[k] += weight * own.matte;
     }
-    const float span =
-        around.surfaces[0].high - around.surfaces[static_cast<std::size_t>(around.count - 1)].low;
+    const float span = around.surfaces[0].high - around.surfaces[around.count - 1].low;
     float between = 0;
     (void)isOneSurface(at, between);
     const float matte = matteAt(at);

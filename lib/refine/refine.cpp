@@ -233,9 +233,7 @@ Result<RefineReport> refineIn(const RefineRoom& room, Bundle& bundle,
     RefineReport report, ofAll;
     RefineSettings once = settings;
     for (const ReferenceView& view : bundle.views) once = once.after(view.refined);
-    if (once.on(poses)) {
-        STX_TRY(ofAll.of(poses), alignPoses(bundle, AlignPoses::asked, job));
-    }
+    if (once.on(poses)) STX_SET(ofAll.of(poses), alignPoses(bundle, AlignPoses::asked, job));
     report.add(ofAll);
     // What is behind everything is of other times: it says nothing of what is in front.
     for (const bool background : {false, true}) {

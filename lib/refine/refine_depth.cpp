@@ -65,25 +65,22 @@ Work workOn(const RefineView& view) {
            Image<float>(width, height), Image<std::uint8_t>(width, height)};
     const DepthAxis axis = w.space.axis;
     const auto* bytes = view.texture->rgba8();
-    parallelForBlocks(0, height, 32, [&](std::int64_t from, std::int64_t to) {
-        for (auto y = static_cast<int>(from); y < to; ++y) {
-            const float* depth = view.depth->row(y).data();
-            std::uint8_t* covered = w.covered.row(y).data();
-            float* q = w.q.row(y).data();
-            const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
-            for (int x = 0; x < width; ++x) {
-                const std::size_t pixel = first + static_cast<std::size_t>(x);
-                covered[x] =
-                    (bytes ? bytes->data()[pixel].a == 255 : view.texture->alpha(pixel) >= 1.0f);
-            }
-            for (int x = 0; x < width; ++x) {
-                const float none =
-                    covered[x] != 0 && view.header->depthMayBeUnknown() ? -1.0f : 0.0f;
-                const bool point = hasPoint(depth[x]) && depth[x] > 0.0f;
-                q[x] = !point         ? none
-                       : axis.inverse ? 1.0f / depth[x]
-                                      : static_cast<float>(axis.q(depth[x]));
-            }
+    parallelFor(0, height, 32, [&](int y) {
+        const float* depth = view.depth->row(y).data();
+        std::uint8_t* covered = w.covered.row(y).data();
+        float* q = w.q.row(y).data();
+        const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
+        for (int x = 0; x < width; ++x) {
+            const std::size_t pixel = first + static_cast<std::size_t>(x);
+            covered[x] =
+                (bytes ? bytes->data()[pixel].a == 255 : view.texture->alpha(pixel) >= 1.0f);
+        }
+        for (int x = 0; x < width; ++x) {
+            const float none = covered[x] != 0 && view.header->depthMayBeUnknown() ? -1.0f : 0.0f;
+            const bool point = hasPoint(depth[x]) && depth[x] > 0.0f;
+            q[x] = !point         ? none
+                   : axis.inverse ? 1.0f / depth[x]
+                                  : static_cast<float>(axis.q(depth[x]));
         }
     });
     return w;
@@ -290,9 +287,9 @@ class SideBySide {
         const auto count = static_cast<std::int64_t>(views_.size());
         const std::int64_t most = room_.atOnce > 0 ? room_.atOnce : count;
         for (std::int64_t first = 0; first < count; first += most)
-            parallelFor(first, std::min(first + most, count), [&](std::int64_t i) {
+            parallelFor(first, std::min(first + most, count), [&](std::size_t i) {
                 if (room_.spool) room_.spool->settle();
-                call(static_cast<std::size_t>(i));
+                call(i);
             });
     }
 

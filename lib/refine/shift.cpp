@@ -44,16 +44,14 @@ Image<float> detailOf(const Texture& texture) {
         const glm::vec4 c = texture.at(i);
         grey.data()[i] = (c.x + c.y + c.z) / 3;
     }
-    parallelForBlocks(0, h, 16, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            for (int x = 0; x < w; ++x) {
-                float sum = 0, count = 0;
-                for (int v = std::max(0, y - kMeanReach); v <= std::min(h - 1, y + kMeanReach); ++v)
-                    for (int u = std::max(0, x - kMeanReach); u <= std::min(w - 1, x + kMeanReach);
-                         ++u, ++count)
-                        sum += grey.at(u, v);
-                detail.at(x, y) = grey.at(x, y) - sum / count;
-            }
+    parallelFor(0, h, 16, [&](int y) {
+        for (int x = 0; x < w; ++x) {
+            float sum = 0, count = 0;
+            for (int v = std::max(0, y - kMeanReach); v <= std::min(h - 1, y + kMeanReach); ++v)
+                for (int u = std::max(0, x - kMeanReach); u <= std::min(w - 1, x + kMeanReach);
+                     ++u, ++count)
+                    sum += grey.at(u, v);
+            detail.at(x, y) = grey.at(x, y) - sum / count;
         }
     });
     return detail;
@@ -80,7 +78,7 @@ float inPicture(const Image<float>& picture, double x, int y, double down) {
     std::array<float, 4> column{};
     for (int k = 0; k < 4; ++k) {
         const int v = std::clamp(above - 1 + k, 0, picture.height() - 1);
-        column[static_cast<std::size_t>(k)] = inRow(picture.row(v).data(), x);
+        column[k] = inRow(picture.row(v).data(), x);
     }
     return between(column.data(), static_cast<float>(down - std::floor(down)));
 }
@@ -124,7 +122,7 @@ double shiftAlongRows(const Image<float>& disparities, const Image<float>& own,
                       std::span<const double> down, std::span<const TexturedPixel> points,
                       double most) {
     std::array<double, 2 * kTries + 1> differences{};
-    parallelFor(0, static_cast<std::int64_t>(differences.size()), [&](std::int64_t n) {
+    parallelFor(0, differences.size(), [&](std::int64_t n) {
         const double shift = most * static_cast<double>(n - kTries) / kTries;
         double sum = 0;
         for (const TexturedPixel& p : points) {
@@ -134,7 +132,7 @@ double shiftAlongRows(const Image<float>& disparities, const Image<float>& own,
                 sum += std::min(std::abs(there - own.at(p.x, p.y)), kMostDifference);
             }
         }
-        differences[static_cast<std::size_t>(n)] = sum;
+        differences[n] = sum;
     });
     const auto best =
         static_cast<std::size_t>(std::ranges::min_element(differences) - differences.begin());
@@ -198,8 +196,7 @@ PictureShift pictureShift(const Image<float>& disparities, const Texture& textur
     std::vector<Image<float>> others;
     for (const SidePicture& p : beside) others.push_back(detailOf(p.texture));
     out.disparity = shiftAlongRows(disparities, own, others, beside, out.down, points, most);
-    parallelFor(0, static_cast<std::int64_t>(others.size()), [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
+    parallelFor(0, others.size(), [&](std::size_t k) {
         out.down[k] =
             rowsBeside(own, others[k], beside[k].steps, out.disparity, disparities, points);
     });

@@ -42,16 +42,14 @@ ShownMap shownBy(const Texture& texture, float freeLevel) {
                                           : Shown::background;
     };
     ShownMap out(width + 1, height + 1);
-    parallelForBlocks(0, out.height(), 32, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y) {
-            const int above = std::max(y - 1, 0), below = std::min(y, height - 1);
-            for (int x = 0; x <= width; ++x) {
-                const int left = std::max(x - 1, 0), right = std::min(x, width - 1);
-                const Shown a = kindOf(left, above);
-                const bool alike = a == kindOf(right, above) && a == kindOf(left, below) &&
-                                   a == kindOf(right, below);
-                out.at(x, y) = alike ? a : Shown::outline;
-            }
+    parallelFor(0, out.height(), 32, [&](int y) {
+        const int above = std::max(y - 1, 0), below = std::min(y, height - 1);
+        for (int x = 0; x <= width; ++x) {
+            const int left = std::max(x - 1, 0), right = std::min(x, width - 1);
+            const Shown a = kindOf(left, above);
+            const bool alike =
+                a == kindOf(right, above) && a == kindOf(left, below) && a == kindOf(right, below);
+            out.at(x, y) = alike ? a : Shown::outline;
         }
     });
     return out;

@@ -58,16 +58,12 @@ struct Side {
 
 Rgba8Image codedColours(const RgbaFloatImage& linear) {
     Rgba8Image out(linear.width(), linear.height());
-    parallelForBlocks(
-        0, static_cast<std::int64_t>(out.count()), 4096, [&](std::int64_t from, std::int64_t to) {
-            for (auto i = static_cast<std::size_t>(from); i < static_cast<std::size_t>(to); ++i) {
-                const glm::vec4 c = glm::clamp(linear.data()[i], 0.0f, 1.0f);
-                for (int k = 0; k < 3; ++k)
-                    out.data()[i][k] =
-                        static_cast<std::uint8_t>(255.0f * srgbFromLinear(c[k]) + 0.5f);
-                out.data()[i].a = static_cast<std::uint8_t>(255.0f * c.a + 0.5f);
-            }
-        });
+    parallelFor(0, out.count(), 4096, [&](std::size_t i) {
+        const glm::vec4 c = glm::clamp(linear.data()[i], 0.0f, 1.0f);
+        for (int k = 0; k < 3; ++k)
+            out.data()[i][k] = static_cast<std::uint8_t>(255.0f * srgbFromLinear(c[k]) + 0.5f);
+        out.data()[i].a = static_cast<std::uint8_t>(255.0f * c.a + 0.5f);
+    });
     return out;
 }
 
@@ -334,7 +330,7 @@ UnmeasuredDepth unmeasuredDepth(std::span<const RefineView> views,
     std::vector<Looked> looked(views.size());
     const auto count = static_cast<std::int64_t>(views.size());
     const auto ofEach = [&](const auto& call) {
-        parallelFor(0, count, [&](std::int64_t i) { call(static_cast<std::size_t>(i)); });
+        parallelFor(0, count, [&](std::size_t i) { call(i); });
     };
     ofEach([&](std::size_t k) {
         if (wanted[k]) looked[k].wanted = openPixels(views[k]);

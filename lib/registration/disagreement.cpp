@@ -81,12 +81,11 @@ OfPair measurePair(const GridOfPoints& from, const ViewHeader& own, const DepthV
 DepthDisagreement disagreement(std::span<const DepthView> views, const std::vector<Pair>& pairs,
                                const OverlapSettings& settings) {
     std::vector<OfPair> found(pairs.size());
-    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
-        const Pair& pair = pairs[static_cast<std::size_t>(i)];
-        const DepthView& from = views[static_cast<std::size_t>(pair.from)];
-        found[static_cast<std::size_t>(i)] =
-            measurePair(gridOfPoints(*from.depth, kMeasured), *from.header,
-                        views[static_cast<std::size_t>(pair.to)], settings.overlapTolerance);
+    parallelFor(0, pairs.size(), [&](std::size_t i) {
+        const Pair& pair = pairs[i];
+        const DepthView& from = views[pair.from];
+        found[i] = measurePair(gridOfPoints(*from.depth, kMeasured), *from.header, views[pair.to],
+                               settings.overlapTolerance);
     });
     return togetherOf(pairs, found, views.size());
 }

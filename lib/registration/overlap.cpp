@@ -111,8 +111,8 @@ std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
     const int count = static_cast<int>(views.size());
     std::vector<std::vector<Pair>> ofView(views.size());
     parallelFor(0, count, [&](std::int64_t i) {
-        const DepthView& from = views[static_cast<std::size_t>(i)];
-        auto& pairs = ofView[static_cast<std::size_t>(i)];
+        const DepthView& from = views[i];
+        auto& pairs = ofView[i];
         const GridOfPoints grid = gridOfPoints(*from.depth, probesAmong(views.size()));
         for (const std::size_t j : viewsThatMayShow(
                  views.size(),

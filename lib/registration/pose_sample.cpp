@@ -79,10 +79,8 @@ PoseSample poseSampleOf(const ReferenceView& view, std::uint64_t mostPixels) {
 std::vector<PoseSample> poseSamplesOf(const std::vector<ReferenceView>& views,
                                       std::uint64_t mostPixels) {
     std::vector<PoseSample> samples(views.size());
-    parallelFor(0, static_cast<std::int64_t>(samples.size()), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
-        samples[at] = poseSampleOf(views[at], mostPixels);
-    });
+    parallelFor(0, samples.size(),
+                [&](std::size_t at) { samples[at] = poseSampleOf(views[at], mostPixels); });
     return samples;
 }
 

@@ -48,8 +48,7 @@ Matrix6 priorOf(const Matrix6& told) {
 
 Bounds boundsOf(const std::vector<PoseSample>& views) {
     std::vector<Bounds> each(views.size());
-    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
+    parallelFor(0, views.size(), [&](std::size_t at) {
         each[at] = boundsOfPoints(views[at].depth, views[at].header.camera);
     });
     return boundsTogether(each);
@@ -74,8 +73,8 @@ PoseSystem::PoseSystem(const std::vector<PoseSample>& views, const std::vector<P
     for (bool changed = true; changed;) {
         changed = false;
         for (const Pair& pair : pairs) {
-            int& a = group_[static_cast<std::size_t>(pair.from)];
-            int& b = group_[static_cast<std::size_t>(pair.to)];
+            int& a = group_[pair.from];
+            int& b = group_[pair.to];
             if (a == b) continue;
             a = b = std::min(a, b);
             changed = true;
@@ -98,8 +97,8 @@ double PoseSystem::solveAndMove(const std::vector<Pair>& pairs,
     for (std::size_t i = 0; i < pairs.size(); ++i) {
         const int from = 6 * pairs[i].from, to = 6 * pairs[i].to;
         const Matrix6 pull = matrixOf(equations[i]);
-        told[static_cast<std::size_t>(pairs[i].from)] += pull;
-        told[static_cast<std::size_t>(pairs[i].to)] += pull;
+        told[pairs[i].from] += pull;
+        told[pairs[i].to] += pull;
         for (int r = 0; r < 6; ++r) {
             right[from + r] -= equations[i].right[r];
             right[to + r] += equations[i].right[r];

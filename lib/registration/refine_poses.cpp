@@ -81,8 +81,8 @@ struct PointResiduals {
 /// The points of pair.from that pair.to sees, too, with both differences there.
 std::vector<PointResiduals> compare(const std::vector<PoseSample>& views, const Pair& pair,
                                     int level, double tolerance) {
-    const PoseSample& from = views[static_cast<std::size_t>(pair.from)];
-    const PoseSample& to = views[static_cast<std::size_t>(pair.to)];
+    const PoseSample& from = views[pair.from];
+    const PoseSample& to = views[pair.to];
     const Camera& own = from.header.camera;
     const Camera& camera = to.header.camera;
     const Pose target(camera);
@@ -154,8 +154,7 @@ double exposureBetween(const std::vector<PointResiduals>& points) {
 double step(std::vector<PoseSample>& views, const std::vector<Pair>& pairs, int level,
             double tolerance, PoseSystem& system) {
     std::vector<PairEquations> equations(pairs.size());
-    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
+    parallelFor(0, pairs.size(), [&](std::size_t at) {
         const auto points = compare(views, pairs[at], level, tolerance);
         const double exposure = exposureBetween(points);
         accumulate(points, &PointResiduals::depth, 0, kLeastDepth, system, equations[at]);
@@ -168,8 +167,7 @@ double step(std::vector<PoseSample>& views, const std::vector<Pair>& pairs, int 
 double coloursApart(const std::vector<PoseSample>& views, const std::vector<Pair>& pairs, int level,
                     double tolerance) {
     std::vector<std::optional<double>> ofPair(pairs.size());
-    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
+    parallelFor(0, pairs.size(), [&](std::size_t at) {
         const auto points = compare(views, pairs[at], level, tolerance);
         if (points.empty()) return;
         const double exposure = exposureBetween(points);

@@ -70,7 +70,7 @@ DeviceChoice deviceChoice(int device) {
         return {true, std::any_of(devices.begin(), devices.end(),
                                   [](const Device& d) { return !d.software; })};
     if (device < 0 || device >= static_cast<int>(devices.size())) return {false, false};
-    return {true, !devices[static_cast<std::size_t>(device)].software};
+    return {true, !devices[device].software};
 }
 #else
 constexpr const char* kNoGpu =

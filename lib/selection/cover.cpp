@@ -32,7 +32,7 @@ void take(const CoverProblem& problem, int view, Best& best) {
 
 std::vector<double> allGains(const CoverProblem& problem, const Best& best) {
     std::vector<double> gains(problem.views.size());
-    parallelFor(0, static_cast<std::int64_t>(gains.size()),
+    parallelFor(0, gains.size(),
                 [&](std::int64_t v) { gains[v] = gainOf(problem, static_cast<int>(v), best); });
     return gains;
 }

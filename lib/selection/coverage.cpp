@@ -223,7 +223,7 @@ std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count) {
     std::vector<CandidateView> views;
     for (const ReferenceView& v : bundle.views) views.push_back(candidateOf(v));
     std::vector<ViewSamples> ofViews(bundle.views.size());
-    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
+    parallelFor(0, views.size(), [&](std::int64_t i) {
         const ReferenceView& v = bundle.views[i];
         const DepthSurface surface = depthSurface(v, {});
         ViewSamples& of = ofViews[i];
@@ -244,7 +244,7 @@ std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count) {
 CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
                           const std::vector<CandidateView>& candidates, double targetDensity) {
     std::vector<std::vector<Seen>> seen(candidates.size());
-    parallelFor(0, static_cast<std::int64_t>(candidates.size()), [&](std::int64_t v) {
+    parallelFor(0, candidates.size(), [&](std::int64_t v) {
         seen[v] = seenOf(samples.size(),
                          [&](std::size_t i) { return sightingOf(candidates[v], samples[i]); });
     });

@@ -6,7 +6,7 @@
 #include <memory>
 #include <numeric>
 
-#include "lib/base/parallel.hpp"
+#include "lib/base/parallel_try.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/capture/rasterizer.hpp"
 #include "lib/model/peak_memory.hpp"
@@ -157,10 +157,9 @@ Result<MeshSelection> selectMeshViews(const Mesh& mesh, const MeshCandidates& ca
     const auto count = static_cast<std::int64_t>(cameras.size());
     std::vector<CandidateView> views(cameras.size());
     std::vector<Image<float>> depths(cameras.size());
-    std::vector<Result<void>> done(cameras.size());
     std::atomic<std::int64_t> finished = 0;
-    parallelFor(0, count, [&](std::int64_t i) {
-        if (done[i] = job.checkCancelled(); !done[i]) return;
+    const auto looked = parallelTry(0, count, [&](std::int64_t i) -> Result<void> {
+        STX_CHECK(job.checkCancelled());
         const Camera& camera = cameras[i];
         const double scale =
             static_cast<double>(candidates.depthSize) / std::max(camera.width, camera.height);
@@ -172,15 +171,12 @@ Result<MeshSelection> selectMeshViews(const Mesh& mesh, const MeshCandidates& ca
             scale < 1 ? camera.resized(shrunk(camera.width), shrunk(camera.height)) : camera;
         RasterSettings raster;
         raster.supersampling = 1;
-        auto image = rasterise(mesh, views[i].depthCamera, raster, job);
-        if (!image) {
-            done[i] = propagate(image);
-            return;
-        }
-        depths[i] = std::move(image->depth);
+        STX_TRY(auto image, rasterise(mesh, views[i].depthCamera, raster, job));
+        depths[i] = std::move(image.depth);
         job.progress(++finished, count, "looking from candidate directions");
+        return {};
     });
-    for (const auto& d : done) STX_CHECK(d);
+    STX_CHECK(looked);
     for (std::size_t i = 0; i < views.size(); ++i) views[i].depth = &depths[i];
 
     const auto samples = sampleMesh(mesh, settings.samples);

@@ -100,10 +100,10 @@ Result<Sheet> sheetOf(const std::vector<SheetPair>& pairs, const SheetSettings& 
     int next = 0;
     for (int i = 0; i < content.groups; ++i) {
         STX_CHECK(job.checkCancelled());
-        const SheetPair& pair = *rows[static_cast<std::size_t>(i)].pair;
+        const SheetPair& pair = *rows[i].pair;
         const bool shown = next < plan.shown && plan.groupAt(next) == i;
         if (shown) ++next;
-        if (rows[static_cast<std::size_t>(i)].depth) {
+        if (rows[i].depth) {
             if (!shown) continue;
             if (pair.depthA.size() != pair.depthB.size())
                 return failAt(pair.title, ErrorCode::invalidInput,
@@ -122,19 +122,17 @@ Result<Sheet> sheetOf(const std::vector<SheetPair>& pairs, const SheetSettings& 
             groups.back().tiles.push_back(depthError(pair.depthA, pair.depthB, plan.cell));
             continue;
         }
-        auto error = colourError(pair.a, pair.b);
-        if (!error) return tl::unexpected(error.error().at(pair.title));
-        total.add(error->found);
+        STX_TRY(auto error, within(pair.title, colourError(pair.a, pair.b)));
+        total.add(error.found);
         if (!shown) continue;
-        groups.push_back(
-            {{pair.title, fmt::format("PSNR {}, SSIM {:.4f}, worst {:.4g} at {} {}",
-                                      decibels(error->found.psnrRgb), error->found.ssimY,
-                                      error->found.worst.difference, error->found.worst.x,
-                                      error->found.worst.y)},
-             {}});
+        groups.push_back({{pair.title, fmt::format("PSNR {}, SSIM {:.4f}, worst {:.4g} at {} {}",
+                                                   decibels(error.found.psnrRgb), error.found.ssimY,
+                                                   error.found.worst.difference,
+                                                   error.found.worst.x, error.found.worst.y)},
+                          {}});
         groups.back().tiles.push_back(colourTile(pair.a, plan.cell));
         groups.back().tiles.push_back(colourTile(pair.b, plan.cell));
-        Tile heat{shrunk(Texture(std::move(error->picture)), plan.cell),
+        Tile heat{shrunk(Texture(std::move(error.picture)), plan.cell),
                   fmt::format("error, {:g} times", kGain)};
         groups.back().tiles.push_back(std::move(heat));
         job.progress(i + 1, content.groups, "pairs");

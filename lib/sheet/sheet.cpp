@@ -111,7 +111,7 @@ Result<Sheet> sheetOf(const ViewTable& table, const SheetSettings& settings, Job
     STX_TRY(const auto plan, planSheet(content, settings, job.limits));
     std::vector<SheetGroup> groups(static_cast<std::size_t>(plan.shown));
     std::vector<int> places(table.count(), -1);  // of those that are shown
-    for (int i = 0; i < plan.shown; ++i) places[static_cast<std::size_t>(plan.groupAt(i))] = i;
+    for (int i = 0; i < plan.shown; ++i) places[plan.groupAt(i)] = i;
     std::atomic<std::int64_t> points = 0, done = 0;
     const auto draw = [&](std::size_t number,
                           const std::shared_ptr<const ReferenceView>& read) -> Result<void> {
@@ -119,7 +119,7 @@ Result<Sheet> sheetOf(const ViewTable& table, const SheetSettings& settings, Job
         points += view.pointCount();
         job.progress(++done, content.groups, "views");
         if (places[number] < 0) return {};
-        SheetGroup& group = groups[static_cast<std::size_t>(places[number])];
+        SheetGroup& group = groups[places[number]];
         group.lines = viewLines(view, number, bundle.origin);
         group.tiles.push_back(colourTile(view.texture, plan.cell));
         group.tiles.push_back(depthTile(view.depth, plan.cell));
@@ -147,7 +147,7 @@ Result<Sheet> sheetOf(const Atlas& atlas, const SheetSettings& settings, Job& jo
     };
     std::vector<AtlasTexture> textures;
     for (int page = 0; page < static_cast<int>(atlas.pages.size()); ++page) {
-        const AtlasPage& p = atlas.pages[static_cast<std::size_t>(page)];
+        const AtlasPage& p = atlas.pages[page];
         textures.push_back({"colour", page});
         textures.push_back({"depth", page});
         if (!p.normal.empty()) textures.push_back({"normal", page});
@@ -164,8 +164,8 @@ Result<Sheet> sheetOf(const Atlas& atlas, const SheetSettings& settings, Job& jo
     std::vector<SheetGroup> groups;
     for (int i = 0; i < plan.shown; ++i) {
         STX_CHECK(job.checkCancelled());
-        const AtlasTexture& kind = textures[static_cast<std::size_t>(plan.groupAt(i))];
-        const AtlasPage& page = atlas.pages[static_cast<std::size_t>(kind.page)];
+        const AtlasTexture& kind = textures[plan.groupAt(i)];
+        const AtlasPage& page = atlas.pages[kind.page];
         const std::string_view name = kind.name;
         Tile tile = name == "colour"     ? colourTile(page.texture, plan.cell)
                     : name == "depth"    ? depthTile(page.depth, plan.cell)

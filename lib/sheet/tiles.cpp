@@ -34,9 +34,8 @@ template <class T, class Make>
 Image<T> shrunkBy(glm::ivec2 size, glm::ivec2 cell, const Make& make) {
     const glm::ivec2 shown = sizeInCell(size, cell);
     Image<T> out(shown.x, shown.y);
-    parallelFor(0, shown.y, [&](std::int64_t y) {
-        for (int x = 0; x < shown.x; ++x)
-            out.at(x, static_cast<int>(y)) = make(under({x, static_cast<int>(y)}, shown, size));
+    parallelFor(0, shown.y, [&](int y) {
+        for (int x = 0; x < shown.x; ++x) out.at(x, y) = make(under({x, y}, shown, size));
     });
     return out;
 }

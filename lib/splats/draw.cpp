@@ -178,8 +178,7 @@ Result<Bins> binned(const std::vector<Projected>& seen, const std::vector<std::u
         }
     };
     const auto forPieces = [&](const auto& body) {
-        parallelFor(0, static_cast<std::int64_t>(pieces),
-                    [&](std::int64_t p) { body(static_cast<std::size_t>(p)); });
+        parallelFor(0, pieces, [&](std::size_t p) { body(p); });
     };
     forPieces([&](std::size_t piece) {
         forPiece(piece, [&](std::uint32_t, std::size_t tile) { ++counts[piece * tiles + tile]; });
@@ -271,7 +270,7 @@ Result<SplatPicture> drawSplats(const SplatCloud& cloud, const Camera& camera, b
             const std::size_t first = at;
             for (std::int64_t i = piece * kPiece; i < std::min(count, (piece + 1) * kPiece); ++i)
                 if (project(cloud, static_cast<std::size_t>(i), eye, seen[at], far[at])) ++at;
-            found[static_cast<std::size_t>(piece)] = at - first;
+            found[piece] = at - first;
         });
         STX_CHECK(job.checkCancelled());
         std::size_t kept = 0;
@@ -315,7 +314,7 @@ Result<SplatPicture> drawSplats(const SplatCloud& cloud, const Camera& camera, b
                 out.colour.at(x, y) = pixelColour({pixels.red[p], pixels.green[p], pixels.blue[p]},
                                                   1.0f - pixels.transmittance[p], cloud.linear);
                 if (pixels.median[p] < 0) continue;
-                const std::size_t splat = seen[static_cast<std::size_t>(pixels.median[p])].number;
+                const std::size_t splat = seen[pixels.median[p]].number;
                 const double depth = depthIn(cloud, splat, eye, x + 0.5, y + 0.5);
                 if (!(depth > 0)) continue;
                 out.depth.at(x, y) = static_cast<float>(depth);

@@ -66,8 +66,7 @@ void keepFinest(const Bundle& bundle, std::vector<Image<Disc>>& discs, PixelSpoo
     std::vector<glm::dmat3> turns;
     for (std::size_t i = 0; i < count; ++i)
         turns.push_back(glm::transpose(glm::mat3_cast(camera(i).orientation)));
-    parallelFor(0, static_cast<std::int64_t>(count), [&](std::int64_t number) {
-        const auto i = static_cast<std::size_t>(number);
+    parallelFor(0, count, [&](std::size_t i) {
         const Image<Disc>& own = discs[i];
         Image<std::uint8_t> found(own.width(), own.height(), 0);
         Bounds bounds;

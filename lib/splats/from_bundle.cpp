@@ -132,9 +132,9 @@ Result<std::vector<Image<Disc>>> finestDiscs(const ViewTable& table, const Splat
                               return {};
                           }));
     splats::keepFinest(std::as_const(table).about(), images, spool);
-    parallelFor(0, static_cast<std::int64_t>(images.size()), [&](std::int64_t i) {
+    parallelFor(0, images.size(), [&](std::size_t i) {
         if (spool) spool->settle();
-        putBelowSurface(images[static_cast<std::size_t>(i)], settings.pixelsPerTexel);
+        putBelowSurface(images[i], settings.pixelsPerTexel);
     });
     STX_CHECK(job.checkCancelled());
     return images;
@@ -171,12 +171,9 @@ class CloudMaker {
     void add(const std::vector<Disc>& list) {
         const std::size_t first = at_;
         at_ += list.size();
-        parallelForBlocks(
-            0, static_cast<std::int64_t>(list.size()), 4096,
-            [&](std::int64_t from, std::int64_t to) {
-                for (auto i = static_cast<std::size_t>(from); i < static_cast<std::size_t>(to); ++i)
-                    setSplat(cloud, first + i, list[i], origin_, static_cast<float>(size_));
-            });
+        parallelFor(0, list.size(), 4096, [&](std::size_t i) {
+            setSplat(cloud, first + i, list[i], origin_, static_cast<float>(size_));
+        });
     }
 
     void add(const Image<Disc>& image) {
@@ -184,7 +181,7 @@ class CloudMaker {
         const std::size_t first = at_;
         at_ += rows.back();
         parallelFor(0, image.height(), [&](std::int64_t y) {
-            std::size_t i = first + rows[static_cast<std::size_t>(y)];
+            std::size_t i = first + rows[y];
             for (const Disc& d : image.row(static_cast<int>(y)))
                 if (d.colour.w > 0.0f) setSplat(cloud, i++, d, origin_, static_cast<float>(size_));
         });

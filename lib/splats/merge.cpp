@@ -59,11 +59,10 @@ Square merged(const Square (&parts)[4]) {
 template <class PartAt>
 Level halved(int width, int height, const PartAt& partAt) {
     Level to(width / 2, height / 2);
-    parallelForBlocks(0, to.height(), kRows, [&](std::int64_t first, std::int64_t last) {
-        for (auto y = static_cast<int>(first); y < last; ++y)
-            for (int x = 0; x < to.width(); ++x)
-                to.at(x, y) = merged({partAt(2 * x, 2 * y), partAt(2 * x + 1, 2 * y),
-                                      partAt(2 * x, 2 * y + 1), partAt(2 * x + 1, 2 * y + 1)});
+    parallelFor(0, to.height(), kRows, [&](int y) {
+        for (int x = 0; x < to.width(); ++x)
+            to.at(x, y) = merged({partAt(2 * x, 2 * y), partAt(2 * x + 1, 2 * y),
+                                  partAt(2 * x, 2 * y + 1), partAt(2 * x + 1, 2 * y + 1)});
     });
     return to;
 }

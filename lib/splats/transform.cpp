@@ -98,12 +98,7 @@ void transformSplats(SplatCloud& cloud, std::size_t first, const glm::dmat4& wor
                 cloud.setHarmonic(i, k, channel, static_cast<float>(values(k)));
         }
     };
-    parallelForBlocks(static_cast<std::int64_t>(first),
-                      static_cast<std::int64_t>(cloud.positions.size()), 4096,
-                      [&](std::int64_t from, std::int64_t to) {
-                          for (std::int64_t i = from; i < to; ++i)
-                              apply(static_cast<std::size_t>(i));
-                      });
+    parallelFor(first, cloud.positions.size(), 4096, [&](std::size_t i) { apply(i); });
 }
 
 }  // namespace stx

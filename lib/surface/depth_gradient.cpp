@@ -215,14 +215,12 @@ void link(const ReferenceView& view, double discontinuity, DepthSurface& surface
         };
         return explains(x - dx, y - dy, x, y) || explains(qx, qy, qx + dx, qy + dy);
     };
-    parallelForBlocks(0, height, kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            for (int x = 0; x < width; ++x) {
-                std::uint8_t bits = 0;
-                if (linked(x, y, 1, 0)) bits |= DepthSurface::kRight;
-                if (linked(x, y, 0, 1)) bits |= DepthSurface::kDown;
-                surface.links.at(x, y) = bits;
-            }
+    parallelFor(0, height, kRowsPerTask, [&](int y) {
+        for (int x = 0; x < width; ++x) {
+            std::uint8_t bits = 0;
+            if (linked(x, y, 1, 0)) bits |= DepthSurface::kRight;
+            if (linked(x, y, 0, 1)) bits |= DepthSurface::kDown;
+            surface.links.at(x, y) = bits;
         }
     });
 }
@@ -235,19 +233,17 @@ void smoothWithinSteps(const ReferenceView& view, int radius, int rounds, DepthS
     const double half = 0.5 * surface.step;
     Image<float> next = surface.w;
     for (int round = 0; round < rounds; ++round) {
-        parallelForBlocks(0, height, kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
-            for (int y = static_cast<int>(from); y < to; ++y) {
-                for (int x = 0; x < width; ++x) {
-                    Plane plane;
-                    if (std::isnan(surface.w.at(x, y)) ||
-                        !fitPlane(surface.w, surface.links, window, x, y, plane))
-                        continue;
-                    const double z = view.depth.at(x, y);
-                    const double a = affineDepth(view.camera, z + half);
-                    const double b = affineDepth(view.camera, std::max(z - half, 0.5 * z));
-                    next.at(x, y) =
-                        static_cast<float>(std::clamp(plane.w, std::min(a, b), std::max(a, b)));
-                }
+        parallelFor(0, height, kRowsPerTask, [&](int y) {
+            for (int x = 0; x < width; ++x) {
+                Plane plane;
+                if (std::isnan(surface.w.at(x, y)) ||
+                    !fitPlane(surface.w, surface.links, window, x, y, plane))
+                    continue;
+                const double z = view.depth.at(x, y);
+                const double a = affineDepth(view.camera, z + half);
+                const double b = affineDepth(view.camera, std::max(z - half, 0.5 * z));
+                next.at(x, y) =
+                    static_cast<float>(std::clamp(plane.w, std::min(a, b), std::max(a, b)));
             }
         });
         std::swap(surface.w, next);
@@ -287,26 +283,23 @@ DepthSurface depthSurface(const ReferenceView& view, const BakeSettings& setting
         smoothWithinSteps(view, std::clamp(static_cast<int>(std::lround(2 + stairs)), 2, 8),
                           stairs > kCoarser ? 4 : 2, surface);
     const auto window = makeWindow(stairs > kCoarsest ? 3 : 2);
-    parallelForBlocks(0, height, kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            for (int x = 0; x < width; ++x) {
-                const double w = surface.w.at(x, y);
-                if (std::isnan(w)) continue;
-                Plane plane;
-                if (coarse && fitPlane(surface.w, surface.links, window, x, y, plane)) {
-                    surface.gradient.at(x, y) = {plane.gx, plane.gy};
-                    continue;
-                }
-                const glm::dvec2 facing = facingGradient(camera, x, y, w);
-                const Line alongX = lineAt(surface, x, y, false),
-                           alongY = lineAt(surface, x, y, true);
-                const double noise = camera.orthographic ? surface.step : surface.step * w * w;
-                surface.gradient.at(x, y) =
-                    robust && !coarse
-                        ? glm::dvec2(creaseSlope(alongX, noise, facing.x),
-                                     creaseSlope(alongY, noise, facing.y))
-                        : glm::dvec2(paperSlope(alongX, facing.x), paperSlope(alongY, facing.y));
+    parallelFor(0, height, kRowsPerTask, [&](int y) {
+        for (int x = 0; x < width; ++x) {
+            const double w = surface.w.at(x, y);
+            if (std::isnan(w)) continue;
+            Plane plane;
+            if (coarse && fitPlane(surface.w, surface.links, window, x, y, plane)) {
+                surface.gradient.at(x, y) = {plane.gx, plane.gy};
+                continue;
             }
+            const glm::dvec2 facing = facingGradient(camera, x, y, w);
+            const Line alongX = lineAt(surface, x, y, false), alongY = lineAt(surface, x, y, true);
+            const double noise = camera.orthographic ? surface.step : surface.step * w * w;
+            surface.gradient.at(x, y) =
+                robust && !coarse
+                    ? glm::dvec2(creaseSlope(alongX, noise, facing.x),
+                                 creaseSlope(alongY, noise, facing.y))
+                    : glm::dvec2(paperSlope(alongX, facing.x), paperSlope(alongY, facing.y));
         }
     });
     return surface;

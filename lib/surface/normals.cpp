@@ -22,36 +22,30 @@ void bakeView(ReferenceView& view, const BakeSettings& settings) {
     if (makeNormals) view.normal = Image<glm::vec3>(width, height, glm::vec3(0));
     view.splatU = Image<glm::vec3>(width, height, glm::vec3(0));
     view.splatV = Image<glm::vec3>(width, height, glm::vec3(0));
-    parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            for (int x = 0; x < width; ++x) {
-                const double w = surface.w.at(x, y);
-                if (std::isnan(w)) continue;
-                const glm::dvec2 gradient = surface.gradient.at(x, y);
-                const PixelSteps steps = planeSteps(camera, x, y, w, gradient);
-                const glm::dvec2 spacing = camera.sampleSpacing(view.depth.at(x, y));
-                const double half = std::sqrt(0.5);
-                view.splatU.at(x, y) =
-                    glm::vec3(camera.orientation *
-                              (half * shortened(steps.alongX, kMaxSplatTilt * spacing.x)));
-                view.splatV.at(x, y) =
-                    glm::vec3(camera.orientation *
-                              (half * shortened(steps.alongY, kMaxSplatTilt * spacing.y)));
-            }
+    parallelFor(0, height, 16, [&](int y) {
+        for (int x = 0; x < width; ++x) {
+            const double w = surface.w.at(x, y);
+            if (std::isnan(w)) continue;
+            const glm::dvec2 gradient = surface.gradient.at(x, y);
+            const PixelSteps steps = planeSteps(camera, x, y, w, gradient);
+            const glm::dvec2 spacing = camera.sampleSpacing(view.depth.at(x, y));
+            const double half = std::sqrt(0.5);
+            view.splatU.at(x, y) = glm::vec3(
+                camera.orientation * (half * shortened(steps.alongX, kMaxSplatTilt * spacing.x)));
+            view.splatV.at(x, y) = glm::vec3(
+                camera.orientation * (half * shortened(steps.alongY, kMaxSplatTilt * spacing.y)));
         }
     });
     if (!makeNormals) return;
     // Splats cover what is seen of them: at outlines those that face the viewpoint do.
     continueSlopes(camera, surface);
-    parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            for (int x = 0; x < width; ++x) {
-                const double w = surface.w.at(x, y);
-                if (!std::isnan(w))
-                    view.normal.at(x, y) = glm::vec3(
-                        camera.orientation *
-                        planeNormal(camera, x, y, w, glm::dvec2(surface.gradient.at(x, y))));
-            }
+    parallelFor(0, height, 16, [&](int y) {
+        for (int x = 0; x < width; ++x) {
+            const double w = surface.w.at(x, y);
+            if (!std::isnan(w))
+                view.normal.at(x, y) =
+                    glm::vec3(camera.orientation *
+                              planeNormal(camera, x, y, w, glm::dvec2(surface.gradient.at(x, y))));
         }
     });
 }

@@ -153,15 +153,12 @@ Result<GpuCheckReport> checkGpus(const GpuCheckSettings& settings, Job& job) {
                     continue;
                 }
                 auto& truth = truths[{&way, &scene}];
-                if (truth.picture.empty()) {
-                    STX_TRY(truth, draw(Backend::cpu, scene.bundle, scene.camera, way, -1, job));
-                }
+                if (truth.picture.empty())
+                    STX_SET(truth, draw(Backend::cpu, scene.bundle, scene.camera, way, -1, job));
                 STX_TRY(const auto found, compare(drawn->picture, truth.picture));
                 ++report.drawn;
                 double least = way.leastDb;
-                if (least == kByOnePixel) {
-                    STX_TRY(least, movedDb(truth.picture));
-                }
+                if (least == kByOnePixel) STX_SET(least, movedDb(truth.picture));
                 const bool alike = found.identical() || *found.psnrRgb >= least;
                 report.wrong += alike ? 0 : 1;
                 settings.print(

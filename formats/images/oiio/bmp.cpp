@@ -20,8 +20,7 @@ std::uint32_t numberAt(std::span<const std::byte> file, std::size_t at, std::siz
 
 void BmpPixel::take(std::span<const std::uint8_t> pixels, std::uint8_t* to) const {
     for (std::size_t i = 0; i + 4 <= pixels.size(); i += 4) {
-        for (int c = 0; c < channels; ++c)
-            *to++ = pixels[i + static_cast<std::size_t>(from[static_cast<std::size_t>(c)])];
+        for (int c = 0; c < channels; ++c) *to++ = pixels[i + static_cast<std::size_t>(from[c])];
     }
 }
 

@@ -238,9 +238,8 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
         m.hasColour = base->contains(glossy ? "diffuseFactor" : "baseColorFactor");
         const char* key = glossy ? "diffuseTexture" : "baseColorTexture";
         STX_TRY(const Json* info, getObject(*base, key, baseWhere));
-        if (info && !model_.files().replacesColour()) {
-            STX_TRY(m.baseColourTexture, texture(*info, baseWhere + "." + key, use.baseColour));
-        }
+        if (info && !model_.files().replacesColour())
+            STX_SET(m.baseColourTexture, texture(*info, baseWhere + "." + key, use.baseColour));
     }
     STX_CHECK(readMetallicRoughness(base, glossy != nullptr, baseWhere, m, use));
     STX_TRY(const Json* normal, getObject(*object, "normalTexture", where));

@@ -262,11 +262,10 @@ class PrimitiveReader {
         STX_TRY(auto material, materials_.use(index, where_));
         STX_TRY(part().uvs, readUvs(material.baseColour));
         // Without a base colour's map, uvs serve the normal map alone.
-        if (material.normal.used && !material.baseColour.used) {
-            STX_TRY(part().uvs, readUvs(material.normal));
-        } else if (material.normal.used && !(material.normal == material.baseColour)) {
-            STX_TRY(part().normalUvs, readUvs(material.normal));
-        }
+        if (material.normal.used && !material.baseColour.used)
+            STX_SET(part().uvs, readUvs(material.normal));
+        else if (material.normal.used && !(material.normal == material.baseColour))
+            STX_SET(part().normalUvs, readUvs(material.normal));
         TexturesKept kept;
         kept.baseColour = !material.baseColour.used || !part().uvs.empty();
         kept.normal = !material.normal.used || !(part().normalUvs.empty() && part().uvs.empty()) ||

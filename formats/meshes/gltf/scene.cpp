@@ -139,8 +139,7 @@ class SceneReader {
             auto& node = nodes_[*it];
             node.worldFromNode = node.parent < 0
                                      ? node.parentFromNode
-                                     : nodes_[static_cast<std::size_t>(node.parent)].worldFromNode *
-                                           node.parentFromNode;
+                                     : nodes_[node.parent].worldFromNode * node.parentFromNode;
         }
         return {};
     }
@@ -222,9 +221,7 @@ class SceneReader {
             STX_TRY(transforms, instances(node, where, worldFromNode));
             std::vector<glm::dmat4> joints;
             STX_TRY(const auto skin, getUint(node, "skin", where));
-            if (skin) {
-                STX_TRY(joints, skinMatrices(*skin, where));
-            }
+            if (skin) STX_SET(joints, skinMatrices(*skin, where));
             std::vector<double> weights;
             STX_TRY(weights, morphWeights(node, where));
             STX_CHECK(addMesh(*mesh, where, weights, transforms, skin ? &joints : nullptr,
@@ -373,9 +370,7 @@ class SceneReader {
             STX_TRY(const Json* mesh, element(root(), "meshes", index, user));
             const auto where = fmt::format("meshes[{}]", index);
             auto weights = nodeWeights;
-            if (weights.empty()) {
-                STX_TRY(weights, morphWeights(*mesh, where));
-            }
+            if (weights.empty()) STX_SET(weights, morphWeights(*mesh, where));
             STX_TRY(const Json* list, getArray(*mesh, "primitives", where));
             for (std::size_t p = 0; list && p < list->size(); ++p) {
                 const auto at = fmt::format("{}.primitives[{}]", where, p);

@@ -96,7 +96,7 @@ Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job) {
         cloud.rotations[i] = glm::vec4(number(8), number(9), number(10), number(7));
         for (int k = 0; k < rest; ++k)
             cloud.setHarmonic(i, k % coefficients, k / coefficients,
-                              static_cast<float>(splat[atRest[static_cast<std::size_t>(k)]]));
+                              static_cast<float>(splat[atRest[k]]));
     }
     return meshOfSplats(std::move(cloud), job);
 }

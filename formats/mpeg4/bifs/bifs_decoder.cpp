@@ -72,10 +72,7 @@ struct BifsDecoder::Impl : BifsNodeReader {
                                  c.target->info->name);
                 STX_TRY(c.position, readPosition(8));
                 int height = 0;
-                STX_TRY(
-                    c.node,
-                    readNode(c.target->info->fields[static_cast<std::size_t>(children)].nodeType, 1,
-                             height));
+                STX_TRY(c.node, readNode(c.target->info->fields[children].nodeType, 1, height));
                 if (!c.node) return error(ErrorCode::invalidInput, "NULL is inserted as a child");
                 return c;
             }
@@ -176,7 +173,7 @@ struct BifsDecoder::Impl : BifsNodeReader {
         std::vector<ReplaceField> each;
         bool reached = true;
         const auto readOne = [&](int index) -> Result<void> {
-            const FieldInfo& field = info.fields[static_cast<std::size_t>(index)];
+            const FieldInfo& field = info.fields[index];
             reached = reached && field.inId >= 0 && field.type != FieldType::MFScript;
             if (!reached && !info.inFields.empty())
                 return error(ErrorCode::unsupported,
@@ -202,7 +199,7 @@ struct BifsDecoder::Impl : BifsNodeReader {
     template <class C>
     Result<void> readListField(C& c) {
         STX_TRY(c.field, readInField(*c.target));
-        const FieldInfo& field = c.target->info->fields[static_cast<std::size_t>(c.field)];
+        const FieldInfo& field = c.target->info->fields[c.field];
         if (!isMultiple(field.type))
             return error(ErrorCode::invalidInput, "an index into {}.{}, which is {}",
                          c.target->info->name, field.name, name(field.type));
@@ -211,7 +208,7 @@ struct BifsDecoder::Impl : BifsNodeReader {
 
     template <class C>
     Result<void> readItemOf(C& c) {
-        const FieldInfo& field = c.target->info->fields[static_cast<std::size_t>(c.field)];
+        const FieldInfo& field = c.target->info->fields[c.field];
         STX_TRY(c.value, readSingle(*c.target->info, field, 1));
         if (const NodePtr* node = std::get_if<NodePtr>(&c.value); node && !*node)
             return error(ErrorCode::invalidInput, "NULL is put into {}.{}", c.target->info->name,
@@ -263,9 +260,7 @@ struct BifsDecoder::Impl : BifsNodeReader {
                 ReplaceField c;
                 STX_TRY(c.target, readTarget());
                 STX_TRY(c.field, readInField(*c.target));
-                STX_TRY(c.value,
-                        readField(*c.target->info,
-                                  c.target->info->fields[static_cast<std::size_t>(c.field)], 1));
+                STX_TRY(c.value, readField(*c.target->info, c.target->info->fields[c.field], 1));
                 return c;
             }
             case 2: {

@@ -42,7 +42,7 @@ struct BifsEncoder::Impl : BifsNodeWriter {
         out.write(2 << 2 | 1, 4);
         STX_CHECK(writeTarget(c.target));
         STX_CHECK(writeInField(*c.target, c.field));
-        return writeField(c.target->info->fields[static_cast<std::size_t>(c.field)], c.value, 1);
+        return writeField(c.target->info->fields[c.field], c.value, 1);
     }
     Result<void> write(const ReplaceRoute& c) {
         out.write(2 << 2 | 3, 4);
@@ -58,8 +58,7 @@ struct BifsEncoder::Impl : BifsNodeWriter {
         if (!c.node) return error("NULL is inserted as a child");
         STX_CHECK(checkPosition(c.position, 8));
         writePosition(c.position, 8);
-        return writeNode(c.node,
-                         c.target->info->fields[static_cast<std::size_t>(children)].nodeType, 1);
+        return writeNode(c.node, c.target->info->fields[children].nodeType, 1);
     }
     Result<void> write(const InsertRoute& c) {
         out.write(0 << 2 | 3, 4);
@@ -84,7 +83,7 @@ struct BifsEncoder::Impl : BifsNodeWriter {
         STX_CHECK(writeInField(*c.target, c.field));
         STX_CHECK(checkPosition(c.position, 16));
         writePosition(c.position, 16);
-        const FieldInfo& field = c.target->info->fields[static_cast<std::size_t>(c.field)];
+        const FieldInfo& field = c.target->info->fields[c.field];
         if (!isMultiple(field.type))
             return error("{}.{} is not a list", c.target->info->name, field.name);
         if constexpr (requires { c.value; }) {

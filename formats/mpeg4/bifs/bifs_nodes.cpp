@@ -73,11 +73,10 @@ Result<T> BifsNodeReader::readItem(const std::optional<QuantisedCoding>& coding)
         return readString();
     } else if constexpr (std::is_same_v<T, Url>) {
         Url url;
-        if (in.flag()) {
+        if (in.flag())
             url.objectDescriptorId = static_cast<int>(in.read(10));
-        } else {
-            STX_TRY(url.text, readString());
-        }
+        else
+            STX_SET(url.text, readString());
         return url;
     } else if constexpr (std::is_same_v<T, glm::vec2>) {
         const float x = coding ? readQuantised(in, *coding, 0) : readFloat();
@@ -170,9 +169,7 @@ Result<FieldValue> BifsNodeReader::readSingle(const NodeInfo& node, const FieldI
     FieldValue value = emptyValue(type);
     const auto read = [&](auto& v) -> Result<void> {
         using T = std::decay_t<decltype(v)>;
-        if constexpr (!kIsList<T> && !std::is_same_v<T, NodePtr>) {
-            STX_TRY(v, readItem<T>(coding));
-        }
+        if constexpr (!kIsList<T> && !std::is_same_v<T, NodePtr>) STX_SET(v, readItem<T>(coding));
         return {};
     };
     STX_CHECK(std::visit(read, value));
@@ -340,7 +337,7 @@ Result<void> BifsNodeReader::readFields(Node& node, int depth) {
 }
 
 Result<void> BifsNodeReader::readInto(Node& node, int index, int depth) {
-    const FieldInfo& field = node.info->fields[static_cast<std::size_t>(index)];
+    const FieldInfo& field = node.info->fields[index];
     if (field.type == FieldType::MFScript) return readScripts(node, index, depth);
     STX_TRY(FieldValue value, readField(*node.info, field, depth));
     quantisation.coded(field, value);

@@ -103,12 +103,11 @@ Result<void> BifsNodeReader::readScripts(Node& script, int index, int depth) {
     if (!in.flag()) {
         // The type of the table: the Script gets one of its own while this is read.
         const NodeInfo& table = *findNode("Script");
-        STX_CHECK(readEach(table, table.fields[static_cast<std::size_t>(index)], 6,
-                           [&](std::uint64_t) -> Result<void> {
-                               STX_TRY(ScriptText text, readScriptItem(script, depth));
-                               scripts.push_back(std::move(text));
-                               return check("Script.url");
-                           }));
+        STX_CHECK(readEach(table, table.fields[index], 6, [&](std::uint64_t) -> Result<void> {
+            STX_TRY(ScriptText text, readScriptItem(script, depth));
+            scripts.push_back(std::move(text));
+            return check("Script.url");
+        }));
     }
     // A url that is coded once more, empty, must not take away the program that brought fields.
     if (scripts.empty() && ownFieldCount(script) > 0) return {};
@@ -173,7 +172,7 @@ Result<std::string> BifsNodeReader::readScriptField(Node& script, int depth) {
         return fieldName;
     }
     if (field.kind == FieldKind::field && in.flag()) {
-        const FieldInfo own = script.info->fields[static_cast<std::size_t>(index)];
+        const FieldInfo own = script.info->fields[index];
         STX_TRY(FieldValue value, readField(*findNode("Script"), own, depth));
         STX_CHECK(useBudget(sizeof(Node::SetField)));
         script.set(index, std::move(value));
@@ -201,9 +200,7 @@ Result<ProtoPtr> BifsNodeReader::readProto(int depth) {
     const auto declared = std::make_shared<Proto>();
     STX_CHECK(useBudget(sizeof(Proto)));
     declared->id = in.read(config.protoIdBits);
-    if (useNames) {
-        STX_TRY(declared->name, readName());
-    }
+    if (useNames) STX_SET(declared->name, readName());
     // Texts need names; these are those of another implementation.
     if (!isFieldName(declared->name)) declared->name = fmt::format("Proto{}", declared->id);
     Proto* const outer = std::exchange(proto, declared.get());
@@ -231,9 +228,7 @@ Result<void> BifsNodeReader::readInterface(Proto& declared, int depth) {
         FieldInfo field;
         field.kind = static_cast<FieldKind>(in.read(2));
         const int code = static_cast<int>(in.read(6));
-        if (useNames) {
-            STX_TRY(field.name, readName());
-        }
+        if (useNames) STX_SET(field.name, readName());
         STX_CHECK(check("the interface of a PROTO"));
         STX_CHECK(useBudget(sizeof(FieldInfo) + sizeof(FieldValue)));
         const bool taken = std::any_of(fields.begin(), fields.end(), [&](const FieldInfo& other) {
@@ -249,9 +244,8 @@ Result<void> BifsNodeReader::readInterface(Proto& declared, int depth) {
         field.type = *type;
         if (itemType(*type) == FieldType::SFNode) field.nodeType = Ndt::SFWorldNode;
         FieldValue value = emptyValue(field.type);
-        if (field.kind == FieldKind::field || field.kind == FieldKind::exposedField) {
-            STX_TRY(value, readField(declared.type, field, depth));
-        }
+        if (field.kind == FieldKind::field || field.kind == FieldKind::exposedField)
+            STX_SET(value, readField(declared.type, field, depth));
         defaults->values.push_back(std::move(value));
         fields.push_back(std::move(field));
     }
@@ -313,7 +307,7 @@ Result<void> BifsNodeReader::readLink(const NodePtr& node, int field) {
     STX_CHECK(check("the body of a PROTO"));
     if (id >= proto->type.fields.size())
         return error(ErrorCode::invalidInput, "{} has no field {}", proto->name, id);
-    const FieldInfo& own = node->info->fields[static_cast<std::size_t>(field)];
+    const FieldInfo& own = node->info->fields[field];
     const FieldInfo& linked = proto->type.fields[id];
     if (own.type != linked.type)
         return error(ErrorCode::invalidInput, "{}.{} is {} and IS {}, which is {}",

@@ -79,10 +79,8 @@ std::array<double, Count + 1> readOnSphere(BitReader& in, int bits, double direc
     }
     const double scale = direction / std::sqrt(length);
     std::array<double, Count + 1> vector{};
-    vector[static_cast<std::size_t>(largest)] = scale;
-    for (int i = 0; i < Count; ++i)
-        vector[static_cast<std::size_t>((largest + i + 1) % (Count + 1))] =
-            tangents[static_cast<std::size_t>(i)] * scale;
+    vector[largest] = scale;
+    for (int i = 0; i < Count; ++i) vector[(largest + i + 1) % (Count + 1)] = tangents[i] * scale;
     return vector;
 }
 
@@ -91,9 +89,7 @@ int largestOf(const std::array<double, Count + 1>& vector) {
     int largest = 0;
     // A later number must be clearly larger, so that rounding does not turn ties around.
     for (int i = 1; i <= Count; ++i)
-        if (std::abs(vector[static_cast<std::size_t>(i)]) >
-            std::abs(vector[static_cast<std::size_t>(largest)]) + 1e-6)
-            largest = i;
+        if (std::abs(vector[i]) > std::abs(vector[largest]) + 1e-6) largest = i;
     return largest;
 }
 
@@ -102,8 +98,8 @@ void writeOnSphere(BitWriter& out, int bits, const std::array<double, Count + 1>
                    int largest) {
     out.write(static_cast<std::uint32_t>(largest), 2);
     for (int i = 0; i < Count; ++i) {
-        const double other = vector[static_cast<std::size_t>((largest + i + 1) % (Count + 1))];
-        const double base = vector[static_cast<std::size_t>(largest)];
+        const double other = vector[(largest + i + 1) % (Count + 1)];
+        const double base = vector[largest];
         writeSigned(out, bits, base == 0 ? 0 : std::atan(other / base) / kQuarterPi);
     }
 }
@@ -212,7 +208,7 @@ glm::vec3 readQuantisedNormal(BitReader& in, const QuantisedCoding& coding) {
 void writeQuantisedNormal(BitWriter& out, const QuantisedCoding& coding, const glm::vec3& normal) {
     const std::array<double, 3> v = {normal.x, normal.y, normal.z};
     const int largest = largestOf<2>(v);
-    out.flag(v[static_cast<std::size_t>(largest)] < 0);
+    out.flag(v[largest] < 0);
     writeOnSphere<2>(out, coding.bits, v, largest);
 }
 

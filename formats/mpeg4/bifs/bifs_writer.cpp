@@ -190,7 +190,7 @@ std::vector<Node::SetField> BifsNodeWriter::fieldsToWrite(const Node& node) cons
     for (const Node::SetField& set : node.setFields) {
         const NodePtr* child = std::get_if<NodePtr>(&set.value);
         if (child != nullptr && !*child) continue;
-        const FieldInfo& info = node.info->fields[static_cast<std::size_t>(set.index)];
+        const FieldInfo& info = node.info->fields[set.index];
         if (info.defId >= static_cast<int>(node.info->defFields.size())) continue;
         const FieldValue& byDefault = defaultValue(*node.info, set.index);
         // Equal in bits, too: -0 is not left out for 0.
@@ -202,7 +202,7 @@ std::vector<Node::SetField> BifsNodeWriter::fieldsToWrite(const Node& node) cons
 }
 
 Result<void> BifsNodeWriter::writeFieldOf(const Node& node, const Node::SetField& set, int depth) {
-    const FieldInfo& field = node.info->fields[static_cast<std::size_t>(set.index)];
+    const FieldInfo& field = node.info->fields[set.index];
     const auto* scripts = std::get_if<std::vector<ScriptText>>(&set.value);
     auto done = scripts ? writeScripts(node, *scripts, depth) : writeField(field, set.value, depth);
     quantisation.coded(field, set.value);
@@ -224,9 +224,7 @@ Result<void> BifsNodeWriter::writeFields(const Node& node, int depth) {
             out.flag(present);
         } else if (present) {
             out.flag(false);
-            out.write(
-                static_cast<std::uint32_t>(info.fields[static_cast<std::size_t>(index)].defId),
-                info.defBits);
+            out.write(static_cast<std::uint32_t>(info.fields[index].defId), info.defBits);
         }
         if (present) STX_CHECK(writeFieldOf(node, *next++, depth));
     }
@@ -313,8 +311,7 @@ Result<void> BifsNodeWriter::writeProtos(const std::vector<ProtoPtr>& protos, in
     if (depth > maxNesting) return error("PROTOs are nested more than {} deep", maxNesting);
     for (const ProtoPtr& declared : protos) {
         out.flag(true);
-        auto done = writeProto(*declared, depth);
-        if (!done) return tl::unexpected(done.error().at(fmt::format("PROTO {}", declared->name)));
+        STX_CHECK(within(fmt::format("PROTO {}", declared->name), writeProto(*declared, depth)));
     }
     out.flag(false);
     return {};
@@ -421,10 +418,10 @@ Result<void> BifsNodeWriter::writeTarget(const NodePtr& target) {
 Result<void> BifsNodeWriter::writeFieldId(const Node& node, int index, int FieldInfo::*mode,
                                           int bits, std::string_view what) {
     const bool exists = index >= 0 && index < static_cast<int>(node.info->fields.size());
-    const int id = exists ? node.info->fields[static_cast<std::size_t>(index)].*mode : -1;
+    const int id = exists ? node.info->fields[index].*mode : -1;
     if (id < 0)
         return error("{}.{} cannot be {}; it has no id for that", node.info->name,
-                     exists ? node.info->fields[static_cast<std::size_t>(index)].name : "?", what);
+                     exists ? node.info->fields[index].name : "?", what);
     out.write(static_cast<std::uint32_t>(id), bits);
     return {};
 }

@@ -145,8 +145,7 @@ class Reader {
             return failAt(place, ErrorCode::invalidInput, "the file has a second 'moov' box");
         facts().moovFirst = !mediaSeen;
         // Boxes and tables made of it take a few times its size.
-        if (auto fits = job_.limits.checkAllocation(size, 4, "the box 'moov'"); !fits)
-            return tl::unexpected(fits.error().at(place));
+        STX_CHECK(within(place, job_.limits.checkAllocation(size, 4, "the box 'moov'")));
         moovBytes_.resize(static_cast<std::size_t>(size));
         STX_CHECK(source_.read(offset, moovBytes_));
         moov_ = {"moov", "moov", ByteReader(moovBytes_, offset)};
@@ -182,10 +181,9 @@ class Reader {
             ByteReader in = iods->body;
             in.skip(4);
             const DescriptorContext context{{}, &facts().deviations};
-            auto decoded = decodeIod(in.restView(), context);
-            if (!decoded) return tl::unexpected(decoded.error().at(iods->place()));
-            document_.iod = std::move(decoded->iod);
-            initialTracks_ = std::move(decoded->trackIds);
+            STX_TRY(auto decoded, within(iods->place(), decodeIod(in.restView(), context)));
+            document_.iod = std::move(decoded.iod);
+            initialTracks_ = std::move(decoded.trackIds);
         } else {
             addDeviation(
                 Deviation::noIods,
@@ -341,9 +339,8 @@ class Reader {
             const std::string place =
                 fmt::format("OD access unit {} at byte {}", i + 1, sample.data.offset);
             STX_TRY(const Bytes bytes, sample.data.load(job_.limits));
-            auto commands = decodeOdFrame(bytes, context);
-            if (!commands) return tl::unexpected(commands.error().at(place));
-            for (OdCommand& command : *commands) {
+            STX_TRY(auto commands, within(place, decodeOdFrame(bytes, context)));
+            for (OdCommand& command : commands) {
                 if (auto* update = std::get_if<UpdateObjectDescriptors>(&command))
                     for (ObjectDescriptor& descriptor : update->descriptors)
                         for (ElementaryStream& stream : descriptor.streams)
@@ -354,7 +351,7 @@ class Reader {
                     job_.note(fmt::format("OD command {:#04x} is passed over",
                                           std::get<OtherOdCommand>(command).tag));
             }
-            document_.odFrames.push_back({sample.time, std::move(*commands), sample.sync && i > 0});
+            document_.odFrames.push_back({sample.time, std::move(commands), sample.sync && i > 0});
         }
         return {};
     }
@@ -416,9 +413,7 @@ class Reader {
         if (type != oti::kSystemsV1 && type != oti::kSystemsV2 && type != 0xFF)
             return failAt(track.path, ErrorCode::unsupported,
                           "the scene has object type {:#04x}; BIFS is 0x01 or 0x02", type);
-        auto config = decodeBifsConfig(track.stream.decoderSpecificInfo, type);
-        if (!config) return tl::unexpected(config.error().at(track.path));
-        return config;
+        return within(track.path, decodeBifsConfig(track.stream.decoderSpecificInfo, type));
     }
 
     struct SceneUnit {
@@ -534,10 +529,10 @@ std::vector<const ObjectDescriptor*> Document::objectDescriptors(std::uint64_t u
             if (const auto* update = std::get_if<UpdateObjectDescriptors>(&command)) {
                 for (const ObjectDescriptor& descriptor : update->descriptors)
                     if (descriptor.id >= 0 && descriptor.id < 1024)
-                        current[static_cast<std::size_t>(descriptor.id)] = &descriptor;
+                        current[descriptor.id] = &descriptor;
             } else if (const auto* removal = std::get_if<RemoveObjectDescriptors>(&command)) {
                 for (const int id : removal->ids)
-                    if (id >= 0 && id < 1024) current[static_cast<std::size_t>(id)] = nullptr;
+                    if (id >= 0 && id < 1024) current[id] = nullptr;
             }
         }
     }

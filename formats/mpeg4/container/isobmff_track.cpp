@@ -199,13 +199,12 @@ Result<void> readSampleEntry(const Box& stsd, const Box& dref, Mp4Track& track) 
     ByteReader body = esds->body;
     fullBox(body);
     if (body.failed()) return damaged(*esds, "the box is too short");
-    auto stream = decodeEsDescriptor(body.restView());
-    if (!stream) return tl::unexpected(stream.error().at(esds->place()));
-    stream->timescale = track.stream.timescale;
-    stream->width = track.stream.width;
-    stream->height = track.stream.height;
-    track.facts.esIdInEsds = stream->esId;
-    track.stream = std::move(*stream);
+    STX_TRY(auto stream, within(esds->place(), decodeEsDescriptor(body.restView())));
+    stream.timescale = track.stream.timescale;
+    stream.width = track.stream.width;
+    stream.height = track.stream.height;
+    track.facts.esIdInEsds = stream.esId;
+    track.stream = std::move(stream);
     if (!isOurEntry(entry.type)) return keepEntry(whole, inner, track);
     return {};
 }
@@ -458,8 +457,8 @@ Result<void> edit(Mp4Track& track, std::uint32_t movieTimescale, const Limits& l
     const bool wide = ByteReader(track.elst.body).u8() == 1;
     std::uint64_t count = 0;
     STX_TRY(ByteReader table, tableOf(track.elst, wide ? 20 : 12, count));
-    if (auto fits = limits.checkAllocation(count, sizeof(Edit), "the edit list"); !fits)
-        return tl::unexpected(fits.error().at(track.elst.place()));
+    STX_CHECK(
+        within(track.elst.place(), limits.checkAllocation(count, sizeof(Edit), "the edit list")));
     EditList list{movieTimescale, {}};
     for (std::uint64_t i = 0; i < count; ++i) {
         Edit one;
@@ -504,8 +503,8 @@ Result<std::vector<Sample>> readSamples(Mp4Track& track, const ByteSource& sourc
         if (box->type.empty())
             return failAt(track.path, ErrorCode::invalidInput, "the track has samples but no '{}'",
                           type);
-    if (auto fits = limits.checkAllocation(sizes.count(), sizeof(Sample), "the samples"); !fits)
-        return tl::unexpected(fits.error().at(track.stsz.place()));
+    STX_CHECK(within(track.stsz.place(),
+                     limits.checkAllocation(sizes.count(), sizeof(Sample), "the samples")));
     STX_CHECK(place(track, sizes, source, samples));
     STX_CHECK(time(track, samples));
     STX_CHECK(edit(track, movieTimescale, limits, samples));

@@ -264,10 +264,9 @@ class Writer {
         track.handlerName = "MPEG-4 scene description";
         BifsEncoder encoder(config, options_.style, ids);
         for (std::size_t i = 0; i < document_.frames.size(); ++i) {
-            auto bytes = encode(encoder, document_.frames[i], config);
-            if (!bytes)
-                return tl::unexpected(bytes.error().at(fmt::format("BIFS access unit {}", i + 1)));
-            addFrame(track, std::move(*bytes), document_.frames[i]);
+            STX_TRY(auto bytes, within(fmt::format("BIFS access unit {}", i + 1),
+                                       encode(encoder, document_.frames[i], config)));
+            addFrame(track, std::move(bytes), document_.frames[i]);
         }
         STX_CHECK(finish(track, "the scene"));
         return track;
@@ -295,10 +294,10 @@ class Writer {
             return found == places.end() ? 0 : found->second;
         };
         for (std::size_t i = 0; i < document_.odFrames.size(); ++i) {
-            auto bytes = encodeOdFrame(withTrackIds(document_.odFrames[i].commands), referenceOf);
-            if (!bytes)
-                return tl::unexpected(bytes.error().at(fmt::format("OD access unit {}", i + 1)));
-            addFrame(track, std::move(*bytes), document_.odFrames[i]);
+            STX_TRY(auto bytes, within(fmt::format("OD access unit {}", i + 1),
+                                       encodeOdFrame(withTrackIds(document_.odFrames[i].commands),
+                                                     referenceOf)));
+            addFrame(track, std::move(bytes), document_.odFrames[i]);
         }
         STX_CHECK(finish(track, "the object descriptor stream"));
         return track;

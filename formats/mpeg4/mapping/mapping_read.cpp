@@ -44,8 +44,7 @@ class BundleReader {
         const ViewReader reader(options_, images, job_);
         std::vector<Result<std::vector<ReferenceView>>> read(plans.size());
         if (options_.pixels) STX_CHECK(reader.checkMemory(plans));
-        parallelFor(0, static_cast<std::int64_t>(plans.size()), [&](std::int64_t i) {
-            const auto at = static_cast<std::size_t>(i);
+        parallelFor(0, plans.size(), [&](std::size_t at) {
             if (!job_.cancelled)
                 read[at] = options_.pixels ? reader.read(plans[at]) : reader.header(plans[at]);
         });
@@ -69,10 +68,9 @@ class BundleReader {
             return fail(ErrorCode::invalidInput, "the scene has {} views; at most {} are read",
                         bundle.views.size(), job_.limits.maxViews);
         makeNamesUnique(bundle);
-        if (options_.pixels && options_.environment) {
-            STX_TRY(bundle.environment,
+        if (options_.pixels && options_.environment)
+            STX_SET(bundle.environment,
                     boundEnvironment(object.backgrounds, images, options_.decode, job_));
-        }
         if (options_.pixels) STX_CHECK(bundle.check());
         return bundle;
     }
@@ -132,11 +130,10 @@ class BundleReader {
     Result<ReferenceView> readOne(const Object& object, std::size_t index,
                                   const StreamImages& images) {
         const ViewPlan& plan = object.plans[index];
-        auto views = ViewReader(options_, images, job_).read(plan);
-        if (!views)
-            return tl::unexpected(views.error().at(fmt::format("view {} '{}'", index, plan.name)));
-        place(views->front(), plan, object.notes, 0);
-        return std::move(views->front());
+        STX_TRY(auto views, within(fmt::format("view {} '{}'", index, plan.name),
+                                   ViewReader(options_, images, job_).read(plan)));
+        place(views.front(), plan, object.notes, 0);
+        return std::move(views.front());
     }
 
   private:
@@ -384,8 +381,7 @@ class MomentViews : public ViewTable {
         STX_TRY(auto read, reader.readOne(object_, index, *images_));
         auto view = std::make_shared<ReferenceView>(std::move(read));
         view->name = about().views[index].name;
-        if (auto ok = view->check(); !ok)
-            return tl::unexpected(ok.error().at(fmt::format("view {}", index)));
+        STX_CHECK(within(fmt::format("view {}", index), view->check()));
         return view;
     }
 
@@ -412,10 +408,9 @@ Result<std::unique_ptr<ViewTable>> viewsOfMoment(std::shared_ptr<const Document>
         STX_TRY(auto bundle, reader.read(object, *images));
         return tableOf(std::move(bundle));
     }
-    if (options.environment) {
-        STX_TRY(headers->bundle.environment,
+    if (options.environment)
+        STX_SET(headers->bundle.environment,
                 boundEnvironment(object.backgrounds, *images, options.decode, job));
-    }
     return std::make_unique<MomentViews>(std::move(document), std::move(images), options,
                                          std::move(object), std::move(*headers));
 }
@@ -453,14 +448,13 @@ const char* nodeKindOf(const Document& document) {
         for (const auto& command : frame.commands) {
             forEachNode(command, [&](const NodePtr& node) {
                 for (int i = 0; i < static_cast<int>(kKinds.size()); ++i) {
-                    if (node->is(kKinds[static_cast<std::size_t>(i)]) ||
-                        (i == 1 && node->is("PointTextureV2")))
+                    if (node->is(kKinds[i]) || (i == 1 && node->is("PointTextureV2")))
                         best = std::max(best, i);
                 }
             });
         }
     }
-    return best < 0 ? "none" : kKinds[static_cast<std::size_t>(best)];
+    return best < 0 ? "none" : kKinds[best];
 }
 
 }  // namespace stx::mpeg4

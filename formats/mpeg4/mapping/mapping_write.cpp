@@ -75,11 +75,10 @@ class SceneWriter {
         NodeList children;
         const auto encode = [&](std::size_t i,
                                 std::shared_ptr<const ReferenceView> view) -> Result<void> {
-            auto encoded =
-                encodeView(*view, options_, job_.limits,
-                           i < options_.splatRanges.size() ? options_.splatRanges[i] : 0);
-            if (!encoded) return tl::unexpected(encoded.error().at(viewName(i)));
-            images[i] = std::move(*encoded);
+            STX_TRY(images[i], within(viewName(i), encodeView(*view, options_, job_.limits,
+                                                              i < options_.splatRanges.size()
+                                                                  ? options_.splatRanges[i]
+                                                                  : 0)));
             if (!bundle_.bounds) bounds[i] = view->computeBounds();
             views[i] = std::move(view);
             return {};
@@ -176,9 +175,9 @@ class SceneWriter {
         octree->set("octree", std::move(parts.octree));
         NodeList images;
         for (std::size_t i = 0; i < parts.pictures.size(); ++i) {
-            auto image = octreePicture(i, parts.pictures[i], ViewNotes::keyOf(i), notes);
-            if (!image) return tl::unexpected(image.error().at(viewName(i)));
-            images.push_back(std::move(*image));
+            STX_TRY(auto image, within(viewName(i), octreePicture(i, parts.pictures[i],
+                                                                  ViewNotes::keyOf(i), notes)));
+            images.push_back(std::move(image));
         }
         notes.count = static_cast<int>(images.size());
         octree->set("images", std::move(images));
@@ -205,11 +204,10 @@ class SceneWriter {
                 centringPadding(picture.camera, std::min(job_.limits.maxImageSide, 65535)));
         const Rgba8Image colour = padded(picture.colour, padding);
         Bytes bytes;
-        if (options_.texture == SceneWriteOptions::Texture::jpeg) {
-            STX_TRY(bytes, colourJpeg(colour, options_.jpegQuality));
-        } else {
-            STX_TRY(bytes, colourPng(colour, false));
-        }
+        if (options_.texture == SceneWriteOptions::Texture::jpeg)
+            STX_SET(bytes, colourJpeg(colour, options_.jpegQuality));
+        else
+            STX_SET(bytes, colourPng(colour, false));
         NodePtr node = makeNode("DepthImage");
         node->defName = defNameOf(bundle_.views[i], i, key, notes);
         setCamera(*node, padding.camera);

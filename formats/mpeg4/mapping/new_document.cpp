@@ -28,9 +28,7 @@ Url addPictureStream(UpdateObjectDescriptors& update, std::string fileName, Byte
 Result<Url> addPictureStream(UpdateObjectDescriptors& update, std::string fileName, Bytes bytes,
                              PictureSpool* spool) {
     ByteRange place;
-    if (spool) {
-        STX_TRY(place, spool->add(bytes));
-    }
+    if (spool) STX_SET(place, spool->add(bytes));
     const Url url = addPictureStream(update, std::move(fileName), std::move(bytes));
     if (spool) update.descriptors.back().streams.front().samples.front().data = place;
     return url;

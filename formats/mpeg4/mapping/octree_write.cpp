@@ -6,7 +6,7 @@
 
 #include "formats/mpeg4/mapping/octree.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
-#include "lib/base/parallel.hpp"
+#include "lib/base/parallel_try.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -311,9 +311,7 @@ Result<OctreeParts> octreeFromBundle(const Bundle& bundle, int levels, Job& job)
     parts.octree = treeOf(samples, levels);
     STX_TRY(const auto octree, Octree::parse(parts.octree, parts.resolution, job.limits));
     parts.pictures.resize(bundle.views.size());
-    std::vector<Result<void>> done(bundle.views.size());
-    parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
+    STX_CHECK(parallelTry(0, bundle.views.size(), [&](std::size_t at) -> Result<void> {
         const ReferenceView& view = bundle.views[at];
         OctreeParts::Picture& picture = parts.pictures[at];
         picture.name = view.name;
@@ -323,20 +321,14 @@ Result<OctreeParts> octreeFromBundle(const Bundle& bundle, int levels, Job& job)
             picture.camera.fx *= parts.side;
             picture.camera.fy *= parts.side;
             picture.colour = std::move(colours[at]);
-            return;
+            return {};
         }
-        const auto camera =
-            cameraAlong(view.camera, first, last, resolution, job.limits.maxImageSide);
-        if (!camera) {
-            done[at] = tl::unexpected(camera.error());
-            return;
-        }
-        picture.camera = *camera;
-        picture.colour = pictureOf(*camera, octree, samples, job);
-    });
+        STX_TRY(picture.camera,
+                cameraAlong(view.camera, first, last, resolution, job.limits.maxImageSide));
+        picture.colour = pictureOf(picture.camera, octree, samples, job);
+        return {};
+    }));
     STX_CHECK(job.checkCancelled());
-    for (auto& result : done)
-        if (!result) return propagate(result);
     return parts;
 }
 

@@ -121,13 +121,13 @@ Result<std::vector<ReferenceView>> viewsFromPointTexture(const Node& node,
                     return fail(ErrorCode::invalidInput, "{}.depth holds {}; {} bits allow 0 to {}",
                                 node.info->name, d, bits + 1, code.dmax);
                 if (d == 0) continue;
-                ReferenceView& layer = views[static_cast<std::size_t>(k)];
+                ReferenceView& layer = views[k];
                 // One bit only: near and far plane, d = 1 is both; take the far plane.
                 layer.depth.at(x, y) = static_cast<float>(
                     code.dmax == 1 ? view.farPlane : code.decode(static_cast<std::uint32_t>(d)));
                 const Color c = colours[point];
-                textures[static_cast<std::size_t>(k)].at(x, y) = {
-                    byteFromUnit(c.r), byteFromUnit(c.g), byteFromUnit(c.b), 255};
+                textures[k].at(x, y) = {byteFromUnit(c.r), byteFromUnit(c.g), byteFromUnit(c.b),
+                                        255};
                 if (!normals.empty()) {
                     const float length = glm::length(normals[point]);
                     layer.normal.at(x, y) = length > 0 ? normals[point] / length : glm::vec3(0);

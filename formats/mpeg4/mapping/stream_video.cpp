@@ -87,9 +87,7 @@ Result<VideoPicture> StreamVideo::picture(const ElementaryStream& stream, std::s
                                           const Limits& limits) {
     STX_TRY(const auto decoder, decoderOf(stream, limits));
     const std::lock_guard lock(decoder->mutex);
-    auto found = decoder->finder->find(sample, limits);
-    if (!found) return tl::unexpected(found.error().at(fmt::format("access unit {}", sample)));
-    return found;
+    return within(fmt::format("access unit {}", sample), decoder->finder->find(sample, limits));
 }
 
 }  // namespace stx::mpeg4

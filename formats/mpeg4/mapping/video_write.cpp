@@ -182,9 +182,7 @@ Bytes withLengths(ByteSpan byteStream) {
 
 Result<int> VideoStreams::begin(ElementaryStream& stream, int width, int height, bool grey,
                                 int bits) {
-    if (!process_) {
-        STX_TRY(process_, VideoProcess::start(limits_));
-    }
+    if (!process_) STX_SET(process_, VideoProcess::start(limits_));
     video::EncoderRequest request;
     request.width = width;
     request.height = height;
@@ -238,7 +236,7 @@ Result<void> VideoStreams::take(int number, const Bytes& answer) {
         sample.time = static_cast<std::uint64_t>(in.get<std::int64_t>());
         sample.sync = in.get<std::uint8_t>() != 0;
         STX_TRY(sample.data, keep_(withLengths(in.getBytes())));
-        streams_[static_cast<std::size_t>(number)]->samples.push_back(std::move(sample));
+        streams_[number]->samples.push_back(std::move(sample));
     }
     if (!in.ok()) return fail(ErrorCode::failed, "the encoder's answer makes no sense");
     return {};

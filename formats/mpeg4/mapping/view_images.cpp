@@ -68,9 +68,7 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
         }
         const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
         out.coverageLost = !alphaFollowsDepth(colour, view.depth, mayBeUnknown);
-        if (mayBeUnknown) {
-            STX_TRY(out.unknown, unknownMask(colour, view.depth));
-        }
+        if (mayBeUnknown) STX_SET(out.unknown, unknownMask(colour, view.depth));
         return out;
     }
     STX_TRY(out.depth, depthPng(view.depth, code, out.padding, out.worstDepth));
@@ -83,17 +81,14 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
     if (mayBeUnknown) out.unknown = options.h264 >= 0 ? kUnknownAll : kUnknownInAlpha;
     if (options.texture == SceneWriteOptions::Texture::jpeg) {
         out.coverageLost = !alphaFollowsDepth(colour, view.depth, mayBeUnknown);
-        if (mayBeUnknown) {
-            STX_TRY(out.unknown, unknownMask(colour, view.depth));
-        }
+        if (mayBeUnknown) STX_SET(out.unknown, unknownMask(colour, view.depth));
         STX_TRY(out.texture, colourJpeg(colour, options.jpegQuality, out.padding));
     } else {
         STX_TRY(out.texture, colourPng(colour, alpha, out.padding));
     }
     if (!isWrittenAsV2(view, options)) return out;
-    if (view.hasNormals()) {
-        STX_TRY(out.normal, normalPng(view.normal, options.normalBits, out.padding));
-    }
+    if (view.hasNormals())
+        STX_SET(out.normal, normalPng(view.normal, options.normalBits, out.padding));
     if (view.hasSplats()) {
         out.longestSplat = longestSplat > 0 ? longestSplat : longestSplatOf(view);
         STX_TRY(out.splatU,

@@ -62,11 +62,10 @@ Result<ReferenceView> ViewReader::cameraOf(const ViewPlan& plan, int width, int 
 }
 
 Result<DecodedImage> ViewReader::decode(const NodePtr& texture, std::string_view what) const {
-    auto image = images_.decode(
-        *texture, options_.decode, job_.limits,
-        what == "depth" ? StreamImages::Samples::codes : StreamImages::Samples::colours);
-    if (!image) return tl::unexpected(image.error().at(std::string(what)));
-    return image;
+    return within(std::string(what),
+                  images_.decode(*texture, options_.decode, job_.limits,
+                                 what == "depth" ? StreamImages::Samples::codes
+                                                 : StreamImages::Samples::colours));
 }
 
 Result<std::vector<ReferenceView>> ViewReader::read(const ViewPlan& plan) const {

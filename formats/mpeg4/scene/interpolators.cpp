@@ -62,7 +62,7 @@ std::optional<FieldValue> interpolated(const Node& node, float fraction) {
 
 bool isField(const NodePtr& node, int field, std::string_view name) {
     return node && field >= 0 && field < static_cast<int>(node->info->fields.size()) &&
-           node->info->fields[static_cast<std::size_t>(field)].name == name;
+           node->info->fields[field].name == name;
 }
 
 class Events {
@@ -87,7 +87,7 @@ class Events {
     void receive(const Route& route, const FieldValue& value) {
         const auto& fields = route.to->info->fields;
         if (route.toField < 0 || route.toField >= static_cast<int>(fields.size())) return;
-        const FieldInfo& field = fields[static_cast<std::size_t>(route.toField)];
+        const FieldInfo& field = fields[route.toField];
         if (isField(route.to, route.toField, "set_fraction")) {
             const float* fraction = std::get_if<float>(&value);
             if (!fraction) return;

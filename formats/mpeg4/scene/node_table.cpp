@@ -231,7 +231,7 @@ FieldType itemType(FieldType type) {
 std::optional<int> codeBits(Ndt type, int version) {
     const auto row = static_cast<std::size_t>(type);
     if (row == 0 || row >= std::size(kNdtRows) || version < 1 || version > kNdtVersions) return {};
-    return kNdtRows[row].codeBits[static_cast<std::size_t>(version - 1)];
+    return kNdtRows[row].codeBits[version - 1];
 }
 
 int NodeInfo::find(std::string_view fieldName) const {

@@ -188,7 +188,7 @@ const FieldValue& Node::value(int fieldIndex) const {
 
 bool Node::set(int fieldIndex, FieldValue newValue) {
     if (fieldIndex < 0 || fieldIndex >= static_cast<int>(info->fields.size())) return false;
-    const FieldInfo& field = info->fields[static_cast<std::size_t>(fieldIndex)];
+    const FieldInfo& field = info->fields[fieldIndex];
     if (!field.hasValue() || field.type != typeOf(newValue)) return false;
     const auto at = std::lower_bound(setFields.begin(), setFields.end(), fieldIndex,
                                      [](const SetField& s, int i) { return s.index < i; });

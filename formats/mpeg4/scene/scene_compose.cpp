@@ -12,7 +12,7 @@ namespace {
 
 /// Whether a field is a moment and not a duration.
 bool isMoment(const NodeInfo& node, int field) {
-    const FieldInfo& info = node.fields[static_cast<std::size_t>(field)];
+    const FieldInfo& info = node.fields[field];
     return info.type == FieldType::SFTime && (info.name == "startTime" || info.name == "stopTime");
 }
 
@@ -29,8 +29,8 @@ class Composer {
         copyAll(commands);
         for (Command& command : commands) {
             ++count_;
-            auto done = std::visit([&](auto& c) { return apply(c); }, command);
-            if (!done) return tl::unexpected(done.error().at(fmt::format("command {}", count_)));
+            STX_CHECK(within(fmt::format("command {}", count_),
+                             std::visit([&](auto& c) { return apply(c); }, command)));
         }
         return {};
     }
@@ -115,7 +115,7 @@ class Composer {
     static Result<void> checkField(const NodePtr& target, int field) {
         if (!target) return fail(ErrorCode::invalidInput, "the command has no target");
         if (field < 0 || field >= static_cast<int>(target->info->fields.size()) ||
-            !target->info->fields[static_cast<std::size_t>(field)].hasValue())
+            !target->info->fields[field].hasValue())
             return fail(ErrorCode::invalidInput, "{} has no field {} that holds a value",
                         target->info->name, field);
         return {};
@@ -146,7 +146,7 @@ class Composer {
                     here = std::find(list->begin(), list->end(), target) != list->end();
                 if (!here) continue;
                 places.emplace_back(node, field.index);
-                const FieldInfo& info = node->info->fields[static_cast<std::size_t>(field.index)];
+                const FieldInfo& info = node->info->fields[field.index];
                 if (inside.contains(node.get()))
                     fits = fail(ErrorCode::invalidInput,
                                 "the node that replaces {} '{}' contains its parent",
@@ -196,7 +196,7 @@ class Composer {
     Result<void> apply(ReplaceField& c) {
         // An event into the scene (addChildren, set_bind) leaves no value behind.
         if (c.target && c.field >= 0 && c.field < static_cast<int>(c.target->info->fields.size()) &&
-            !c.target->info->fields[static_cast<std::size_t>(c.field)].hasValue())
+            !c.target->info->fields[c.field].hasValue())
             return applyEvent(c);
         STX_CHECK(checkField(c.target, c.field));
         STX_CHECK(checkNotInside(c.target, c.value));
@@ -205,13 +205,12 @@ class Composer {
             *time += begin_;
         if (!c.target->set(c.field, c.value))
             return fail(ErrorCode::invalidInput, "{}.{} does not take this value",
-                        c.target->info->name,
-                        c.target->info->fields[static_cast<std::size_t>(c.field)].name);
+                        c.target->info->name, c.target->info->fields[c.field].name);
         return {};
     }
 
     Result<void> applyEvent(ReplaceField& c) {
-        const std::string& event = c.target->info->fields[static_cast<std::size_t>(c.field)].name;
+        const std::string& event = c.target->info->fields[c.field].name;
         const int children = c.target->info->find("children");
         const NodeList* nodes = std::get_if<NodeList>(&c.value);
         if (children < 0 || nodes == nullptr) return {};
@@ -250,7 +249,7 @@ class Composer {
                         Change what) {
         STX_CHECK(checkField(target, field));
         STX_CHECK(checkNotInside(target, item));
-        const FieldInfo& info = target->info->fields[static_cast<std::size_t>(field)];
+        const FieldInfo& info = target->info->fields[field];
         if (!isMultiple(info.type) ||
             (what != Change::remove && typeOf(item) != itemType(info.type)))
             return fail(ErrorCode::invalidInput, "{}.{} is {}, which does not take this item",
@@ -276,7 +275,7 @@ class Composer {
                     else if (what == Change::insert)
                         list.insert(list.begin() + at, std::get<Item>(item));
                     else
-                        list[static_cast<std::size_t>(at)] = std::get<Item>(item);
+                        list[at] = std::get<Item>(item);
                 }
                 return {};
             },

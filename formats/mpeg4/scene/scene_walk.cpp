@@ -47,7 +47,7 @@ class Walker {
             const auto& choice = node->get<NodeList>("choice");
             const auto chosen = node->get<std::int32_t>("whichChoice");
             if (chosen >= 0 && static_cast<std::size_t>(chosen) < choice.size())
-                return visit(choice[static_cast<std::size_t>(chosen)], world, ++groups_, depth + 1);
+                return visit(choice[chosen], world, ++groups_, depth + 1);
         } else if (type == "LOD") {
             const auto& levels = node->get<NodeList>("level");
             if (!levels.empty()) return visitAsGroup(*node, {levels[0]}, world, depth);

@@ -31,10 +31,9 @@ Result<BtReader::Target> BtReader::readTarget() {
     STX_TRY(const auto text, takeName("the DEF name of a node"));
     const auto dot = text.rfind('.');
     STX_TRY(target.node, names_.target(text.substr(0, dot), target.where));
-    if (dot != std::string::npos) {
-        STX_TRY(target.field, fieldOfCommand(*target.node, std::string_view(text).substr(dot + 1),
+    if (dot != std::string::npos)
+        STX_SET(target.field, fieldOfCommand(*target.node, std::string_view(text).substr(dot + 1),
                                              FieldUse::in, target.where));
-    }
     if (lexer_.peek().kind == Kind::openBracket && target.field >= 0) {
         STX_TRY([[maybe_unused]] const auto open, lexer_.take());
         target.position = Position();
@@ -183,9 +182,7 @@ Result<void> BtReader::readInsert(std::uint64_t time, bool atEnd) {
     if (isRoute) {
         STX_TRY(const bool isNamed, takeIf("DEF"));
         std::string defName;
-        if (isNamed) {
-            STX_TRY(defName, takeName("a DEF name"));
-        }
+        if (isNamed) STX_SET(defName, takeName("a DEF name"));
         STX_TRY(auto route, readRoute(defName));
         addCommand(document_.frames, time, InsertRoute{std::move(route)});
         return {};

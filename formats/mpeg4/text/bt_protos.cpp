@@ -128,9 +128,7 @@ Result<void> BtReader::readProtoBody(Proto& proto, int depth) {
         std::string defName;
         const std::string nodeWhere = lexer_.where();
         STX_TRY(const bool def, takeIf("DEF"));
-        if (def) {
-            STX_TRY(defName, takeName("a DEF name"));
-        }
+        if (def) STX_SET(defName, takeName("a DEF name"));
         STX_TRY(const bool isRoute, takeIf("ROUTE"));
         if (isRoute) {
             STX_TRY(auto route, readRoute(defName));

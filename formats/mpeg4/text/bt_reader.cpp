@@ -115,9 +115,7 @@ Result<void> BtReader::readBlock() {
     const std::uint64_t time = static_cast<std::uint64_t>(*number) + (relative ? lastTime_ : 0);
     lastTime_ = time;
     STX_TRY(const bool in, takeIf("IN"));
-    if (in) {
-        STX_TRY([[maybe_unused]] const auto stream, takeName("a stream's ES_ID"));
-    }
+    if (in) STX_SET([[maybe_unused]] const auto stream, takeName("a stream's ES_ID"));
     const std::size_t before = commandsAt(document_.frames, time);
     rap_ = rap;
     STX_CHECK(readBlockCommands(time));
@@ -271,9 +269,7 @@ Result<NodePtr> BtReader::readNode(int depth, int& height, NodePtr owner, int fi
     }
     STX_TRY(const bool def, takeIf("DEF"));
     std::string defName;
-    if (def) {
-        STX_TRY(defName, takeName("a DEF name"));
-    }
+    if (def) STX_SET(defName, takeName("a DEF name"));
     return readNodeBody(defName, where, depth, height);
 }
 

@@ -75,7 +75,7 @@ void TextBuffers::fill(std::vector<Command>& commands) const {
         if (value == nullptr || value->bytes.size() != 8) continue;
         std::uint64_t number = 0;
         for (int i = 0; i < 8; ++i) number |= std::uint64_t{value->bytes[i]} << (8 * i);
-        *value = buffers_[static_cast<std::size_t>(number)].coded;
+        *value = buffers_[number].coded;
     }
 }
 

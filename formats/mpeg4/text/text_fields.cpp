@@ -281,8 +281,7 @@ void appendFieldValue(std::string& out, const FieldValue& value, TextStyle style
 }
 
 static bool holdsBytes(const NodeInfo& node, int field) {
-    return node.name == "BitWrapper" &&
-           node.fields[static_cast<std::size_t>(field)].name == "buffer";
+    return node.name == "BitWrapper" && node.fields[field].name == "buffer";
 }
 
 FieldValue toText(const NodeInfo& node, int field, const FieldValue& value) {

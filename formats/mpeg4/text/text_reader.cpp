@@ -91,8 +91,8 @@ Result<void> TextReader::addLink(const NodePtr& node, int field, std::string_vie
     if (index < 0)
         return failAt(where, ErrorCode::invalidInput, "PROTO {} has no field '{}'", proto_->name,
                       excerpt(linked));
-    const FieldInfo& own = node->info->fields[static_cast<std::size_t>(field)];
-    const FieldInfo& other = proto_->type.fields[static_cast<std::size_t>(index)];
+    const FieldInfo& own = node->info->fields[field];
+    const FieldInfo& other = proto_->type.fields[index];
     if (own.type != other.type)
         return failAt(where, ErrorCode::invalidInput, "{}.{} is {} and IS {}, which is {}",
                       node->info->name, own.name, name(own.type), other.name, name(other.type));

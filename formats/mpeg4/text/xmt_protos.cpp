@@ -29,7 +29,7 @@ Result<FieldInfo> XmtReader::readDeclaration(xml_node element) const {
 
 Result<void> XmtReader::readDeclaredValue(xml_node element, const NodePtr& node, int index,
                                           int depth, int& below) {
-    const FieldInfo field = node->info->fields[static_cast<std::size_t>(index)];
+    const FieldInfo field = node->info->fields[index];
     if (!field.hasValue()) return {};
     if (itemType(field.type) == FieldType::SFNode) {
         // <node> or <nodes> hold them, or nothing does.

@@ -248,14 +248,12 @@ class XmtReader : private TextReader {
                           "<{}> has neither atNode, atRoute nor <Scene>", type);
         STX_TRY(const auto target, names_.target(node.attribute("atNode").value(), where(node)));
         int field = -1;
-        if (!node.attribute("atField").empty()) {
-            STX_TRY(field, fieldOfCommand(*target, node.attribute("atField").value(), FieldUse::in,
+        if (!node.attribute("atField").empty())
+            STX_SET(field, fieldOfCommand(*target, node.attribute("atField").value(), FieldUse::in,
                                           where(node)));
-        }
         std::optional<Position> position;
-        if (const auto attribute = node.attribute("position"); !attribute.empty()) {
-            STX_TRY(position, positionOf(node, attribute.value()));
-        }
+        if (const auto attribute = node.attribute("position"); !attribute.empty())
+            STX_SET(position, positionOf(node, attribute.value()));
         if (field >= 0) return readFieldCommand(node, type, time, target, field, position);
         if (type == "Insert") return insertNode(node, time, target, position);
         if (type == "Replace") return replaceNode(node, time, target);

@@ -95,7 +95,7 @@ class Server {
     Encoder& encoderOf(std::int32_t number) {
         if (number < 0 || static_cast<std::size_t>(number) >= encoders_.size())
             refuse(ErrorCode::failed, "there is no encoder {}", number);
-        return *encoders_[static_cast<std::size_t>(number)];
+        return *encoders_[number];
     }
     Answer push(Unpacker& in) {
         const auto time = in.get<std::int64_t>();

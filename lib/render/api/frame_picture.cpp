@@ -23,9 +23,9 @@ Rgba8Image rgba8From(const Frame& frame, const std::optional<glm::vec3>& backgro
     Rgba8Image out(frame.colour.width(), frame.colour.height());
     const auto behind = inSpaceOf(frame, background);
     const Srgb8Tables& srgb = srgb8Tables();
-    parallelFor(0, out.height(), [&](std::int64_t y) {
-        const auto from = frame.colour.row(static_cast<int>(y));
-        const auto to = out.row(static_cast<int>(y));
+    parallelFor(0, out.height(), [&](int y) {
+        const auto from = frame.colour.row(y);
+        const auto to = out.row(y);
         for (std::size_t x = 0; x < to.size(); ++x) {
             glm::vec4 p = over(from[x], behind);
             if (!(p.a > 0.0f)) continue;

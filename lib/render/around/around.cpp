@@ -27,9 +27,8 @@ glm::vec4 sharp(const Image<glm::vec4>& image, float x, float y) {
     for (int j = 0; j < 4; ++j) {
         const auto row = image.row(std::clamp(y0 - 1 + j, 0, image.height() - 1));
         for (int i = 0; i < 4; ++i) {
-            const glm::vec4 c =
-                row[static_cast<std::size_t>(std::clamp(x0 - 1 + i, 0, image.width() - 1))];
-            sum += c * (wx[static_cast<std::size_t>(i)] * wy[static_cast<std::size_t>(j)]);
+            const glm::vec4 c = row[std::clamp(x0 - 1 + i, 0, image.width() - 1)];
+            sum += c * (wx[i] * wy[j]);
             if ((i == 1 || i == 2) && (j == 1 || j == 2)) {
                 low = glm::min(low, c);
                 high = glm::max(high, c);
@@ -100,7 +99,7 @@ Result<Frame> renderAround(Renderer& renderer, const Camera& camera, int width, 
     std::vector<glm::vec2> column(static_cast<std::size_t>(width));  // sine, cosine of longitude
     for (int x = 0; x < width; ++x) {
         const double longitude = ((x + 0.5) / width - 0.5) * glm::two_pi<double>();
-        column[static_cast<std::size_t>(x)] = {std::sin(longitude), std::cos(longitude)};
+        column[x] = {std::sin(longitude), std::cos(longitude)};
     }
     Frame out;
     out.colour = Image<glm::vec4>(width, height, glm::vec4(0.0f));
@@ -118,29 +117,25 @@ Result<Frame> renderAround(Renderer& renderer, const Camera& camera, int width, 
         const Camera& c = cameras[f];
         const glm::mat3 faceFromCamera(
             glm::mat3_cast(glm::conjugate(c.orientation) * camera.orientation));
-        parallelForBlocks(0, height, 8, [&](std::int64_t from, std::int64_t to) {
-            for (auto y = static_cast<int>(from); y < to; ++y) {
-                const double latitude = (0.5 - (y + 0.5) / height) * glm::pi<double>();
-                const auto up = static_cast<float>(std::sin(latitude));
-                const auto level = static_cast<float>(std::cos(latitude));
-                for (int x = 0; x < width; ++x) {
-                    const glm::vec2 turn = column[static_cast<std::size_t>(x)];
-                    const glm::vec3 d(level * turn.x, up, -level * turn.y);
-                    if (faceOf(d) != static_cast<int>(f)) continue;
-                    const glm::vec3 in = faceFromCamera * d;  // z is -1/sqrt(3) at most
-                    const float px =
-                        static_cast<float>(c.cx) + static_cast<float>(c.fx) * in.x / -in.z;
-                    const float py =
-                        static_cast<float>(c.cy) - static_cast<float>(c.fy) * in.y / -in.z;
-                    out.colour.at(x, y) = sharp(face.colour, px, py);
-                    if (!face.albedo.empty()) out.albedo.at(x, y) = sharp(face.albedo, px, py);
-                    const float dist = depthAt(face.depth, px, py);
-                    if (hasPoint(dist)) out.depth.at(x, y) = dist / -in.z;
-                    if (!face.normal.empty())
-                        out.normal.at(x, y) =
-                            face.normal.at(std::clamp(static_cast<int>(px), 0, c.width - 1),
-                                           std::clamp(static_cast<int>(py), 0, c.height - 1));
-                }
+        parallelFor(0, height, 8, [&](int y) {
+            const double latitude = (0.5 - (y + 0.5) / height) * glm::pi<double>();
+            const auto up = static_cast<float>(std::sin(latitude));
+            const auto level = static_cast<float>(std::cos(latitude));
+            for (int x = 0; x < width; ++x) {
+                const glm::vec2 turn = column[x];
+                const glm::vec3 d(level * turn.x, up, -level * turn.y);
+                if (faceOf(d) != static_cast<int>(f)) continue;
+                const glm::vec3 in = faceFromCamera * d;  // z is -1/sqrt(3) at most
+                const float px = static_cast<float>(c.cx) + static_cast<float>(c.fx) * in.x / -in.z;
+                const float py = static_cast<float>(c.cy) - static_cast<float>(c.fy) * in.y / -in.z;
+                out.colour.at(x, y) = sharp(face.colour, px, py);
+                if (!face.albedo.empty()) out.albedo.at(x, y) = sharp(face.albedo, px, py);
+                const float dist = depthAt(face.depth, px, py);
+                if (hasPoint(dist)) out.depth.at(x, y) = dist / -in.z;
+                if (!face.normal.empty())
+                    out.normal.at(x, y) =
+                        face.normal.at(std::clamp(static_cast<int>(px), 0, c.width - 1),
+                                       std::clamp(static_cast<int>(py), 0, c.height - 1));
             }
         });
     }

@@ -133,8 +133,7 @@ ReferenceView viewOfAnalyticScene(AnalyticScene scene, const Camera& camera, int
     Rgba8Image colour(camera.width, camera.height, glm::u8vec4(0));
     view.depth = Image<float>(camera.width, camera.height, kNoDepth);
     view.normal = Image<glm::vec3>(camera.width, camera.height, glm::vec3(0));
-    parallelFor(0, camera.height, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(0, camera.height, [&](int y) {
         for (int x = 0; x < camera.width; ++x) {
             const Hit centre = trace(scene, camera, x + 0.5, y + 0.5);
             if (centre.t >= 0) {

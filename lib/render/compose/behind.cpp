@@ -81,11 +81,9 @@ void putBehind(Frame& front, const Frame& background, const MayStand& mayStand) 
 void forgetFar(Image<float>& depth, double farAway) {
     if (!(farAway > 0)) return;
     const auto limit = static_cast<float>(0.5 * farAway);
-    parallelForBlocks(0, static_cast<std::int64_t>(depth.count()), 1 << 16,
-                      [&](std::int64_t from, std::int64_t to) {
-                          for (std::int64_t i = from; i < to; ++i)
-                              if (depth.data()[i] > limit) depth.data()[i] = kNoDepth;
-                      });
+    parallelFor(0, depth.count(), 1 << 16, [&](std::int64_t i) {
+        if (depth.data()[i] > limit) depth.data()[i] = kNoDepth;
+    });
 }
 
 std::unique_ptr<Renderer> withBackground(std::unique_ptr<Renderer> front,

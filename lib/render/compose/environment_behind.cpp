@@ -43,26 +43,24 @@ void putEnvironmentBehind(Frame& frame, const Camera& camera, const EnvironmentM
     const glm::vec4 all =
         camera.orthographic ? environment.sampleTurned(forward, 0, linear) : glm::vec4(0.0f);
     const int width = frame.colour.width();
-    parallelForBlocks(0, frame.colour.height(), 4, [&](std::int64_t from, std::int64_t to) {
-        for (auto y = static_cast<int>(from); y < to; ++y) {
-            const auto row = frame.colour.row(y);
-            const glm::vec3 begin =
-                forward - up * static_cast<float>((y + 0.5 - camera.cy) / camera.fy);
-            for (int x = 0; x < width; ++x) {
-                glm::vec4& colour = row[static_cast<std::size_t>(x)];
-                if (colour.a >= kCoveredInFull) {
-                    colour /= colour.a;
-                    continue;
-                }
-                const glm::vec4 behind =
-                    camera.orthographic
-                        ? all
-                        : environment.sampleTurned(
-                              begin + right * static_cast<float>((x + 0.5 - camera.cx) / camera.fx),
-                              spacing, linear);
-                colour += behind * (1.0f - std::max(colour.a, 0.0f));
-                if (behind.a >= 1.0f) colour.a = 1.0f;  // but for rounding
+    parallelFor(0, frame.colour.height(), 4, [&](int y) {
+        const auto row = frame.colour.row(y);
+        const glm::vec3 begin =
+            forward - up * static_cast<float>((y + 0.5 - camera.cy) / camera.fy);
+        for (int x = 0; x < width; ++x) {
+            glm::vec4& colour = row[x];
+            if (colour.a >= kCoveredInFull) {
+                colour /= colour.a;
+                continue;
             }
+            const glm::vec4 behind =
+                camera.orthographic
+                    ? all
+                    : environment.sampleTurned(
+                          begin + right * static_cast<float>((x + 0.5 - camera.cx) / camera.fx),
+                          spacing, linear);
+            colour += behind * (1.0f - std::max(colour.a, 0.0f));
+            if (behind.a >= 1.0f) colour.a = 1.0f;  // but for rounding
         }
     });
 }

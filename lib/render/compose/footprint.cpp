@@ -200,14 +200,12 @@ Frame minified(const Frame& large, int factor) {
             out.normal.at(x, y) = normal / length;
     };
     const bool plain = factor == 2 && large.albedo.empty() && large.normal.empty();
-    parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            if (plain) {
-                halveRow(large, y, out);
-                continue;
-            }
-            for (int x = 0; x < width; ++x) pixel(x, y);
+    parallelFor(0, height, 16, [&](int y) {
+        if (plain) {
+            halveRow(large, y, out);
+            return;
         }
+        for (int x = 0; x < width; ++x) pixel(x, y);
     });
     return out;
 }

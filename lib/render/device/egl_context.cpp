@@ -287,8 +287,7 @@ Result<std::shared_ptr<EglContext>> EglContext::create(int device, Profile profi
         return fail(ErrorCode::usage, "device {} does not exist; the devices are {}", device,
                     fmt::join(names, ", "));
     }
-    return std::shared_ptr<EglContext>(
-        new EglContext(std::move(all[static_cast<std::size_t>(std::max(device, 0))])));
+    return std::shared_ptr<EglContext>(new EglContext(std::move(all[std::max(device, 0)])));
 }
 
 const Device& EglContext::device() const {

@@ -107,11 +107,11 @@ Outlines::~Outlines() = default;
 Outlines::Outlines(PageSet set) : set_(std::move(set)) {
     const auto rectangles = set_.rectangles();
     std::vector<std::vector<OutlineBlock>> found(rectangles.size());
-    parallelFor(0, static_cast<std::int64_t>(rectangles.size()), [&](std::int64_t n) {
+    parallelFor(0, rectangles.size(), [&](std::int64_t n) {
         set_.settle();
-        const PageRectangle& r = rectangles[static_cast<std::size_t>(n)];
-        if (set_.views()[static_cast<std::size_t>(r.view)].unread) return;
-        const Page& page = set_.pages()[static_cast<std::size_t>(r.page)];
+        const PageRectangle& r = rectangles[n];
+        if (set_.views()[r.view].unread) return;
+        const Page& page = set_.pages()[r.page];
         for (int v = 0; v < r.height; v += kOutlineBlock) {
             for (int u = 0; u < r.width; u += kOutlineBlock) {
                 OutlineBlock b;
@@ -131,7 +131,7 @@ Outlines::Outlines(PageSet set) : set_(std::move(set)) {
                         b.zMax = std::max(b.zMax, depth[x]);
                     }
                 }
-                if (b.zMin < kNoDepth) found[static_cast<std::size_t>(n)].push_back(b);
+                if (b.zMin < kNoDepth) found[n].push_back(b);
             }
         }
     });
@@ -189,7 +189,7 @@ std::vector<std::uint8_t> Outlines::askedViews(const Camera& camera) const {
 
 OutlineDepths Outlines::depthsOf(const OutlineBlock& block) const {
     const PageRectangle& r = set_.rectangles()[block.rectangle];
-    const Page& page = set_.pages()[static_cast<std::size_t>(r.page)];
+    const Page& page = set_.pages()[r.page];
     const auto stride = static_cast<std::size_t>(page.width());
     return {page.depth->data() + static_cast<std::size_t>(r.pageY) * stride + r.pageX, stride};
 }
@@ -253,50 +253,45 @@ void Outlines::findBlocks(const Camera& camera, const std::vector<PixelMap>& map
         int from = 0, to = -1;  // inclusive
     };
     std::vector<Rows> reached(blocks_.size());
-    parallelForBlocks(
-        0, static_cast<std::int64_t>(blocks_.size()), 512, [&](std::int64_t from, std::int64_t to) {
-            for (auto n = static_cast<std::size_t>(from); n < static_cast<std::size_t>(to); ++n) {
-                const OutlineBlock& b = blocks_[n];
-                const PageRectangle& r = set_.rectangles()[b.rectangle];
-                if (!asked.empty() && !asked[static_cast<std::size_t>(r.view)]) continue;
-                const auto& [a0, au, av, b0, bu, bv] = coarseMaps[b.rectangle];
-                // Eight corners side by side, so that compilers make vectors of it.
-                std::array<float, 8> x, y, along;
-                for (std::size_t corner = 0; corner < 8; ++corner) {
-                    const auto u = static_cast<float>(corner & 1 ? b.u1 - 1 : b.u0);
-                    const auto v = static_cast<float>(corner & 2 ? b.v1 - 1 : b.v0);
-                    const float z = corner & 4 ? b.zMax : b.zMin;
-                    const glm::vec3 at = (a0 + au * u + av * v) * z + b0 + bu * u + bv * v;
-                    const float scale = camera.orthographic ? 1.0f : 1.0f / at.z;
-                    along[corner] = at.z;
-                    x[corner] = at.x * scale;
-                    y[corner] = at.y * scale;
-                }
-                const auto [x0, x1] = std::ranges::minmax(x);
-                const auto [y0, y1] = std::ranges::minmax(y);
-                const float least = std::ranges::min(along);
-                // What reaches behind the camera is too near to draw an outline.
-                if (!(least > 0)) continue;
-                constexpr float kRoom = 1.5f;
-                if (!(x1 >= -kRoom && y1 >= -kRoom && x0 <= static_cast<float>(size.x) + kRoom &&
-                      y0 <= static_cast<float>(size.y) + kRoom))
-                    continue;
-                const int left = static_cast<int>(std::max(0.0f, x0 - kRoom));
-                const int right =
-                    static_cast<int>(std::min(static_cast<float>(size.x - 1), x1 + kRoom));
-                const int above = static_cast<int>(std::max(0.0f, y0 - kRoom));
-                const int below =
-                    static_cast<int>(std::min(static_cast<float>(size.y - 1), y1 + kRoom));
-                const int endX = right / kTile + 1, endY = below / kTile + 1;
-                if (before.at(endX, endY) - before.at(left / kTile, endY) !=
-                    before.at(endX, above / kTile) - before.at(left / kTile, above / kTile))
-                    reached[n] = {above, below};
-            }
-        });
+    parallelFor(0, blocks_.size(), 512, [&](std::size_t n) {
+        const OutlineBlock& b = blocks_[n];
+        const PageRectangle& r = set_.rectangles()[b.rectangle];
+        if (!asked.empty() && !asked[r.view]) return;
+        const auto& [a0, au, av, b0, bu, bv] = coarseMaps[b.rectangle];
+        // Eight corners side by side, so that compilers make vectors of it.
+        std::array<float, 8> x, y, along;
+        for (std::size_t corner = 0; corner < 8; ++corner) {
+            const auto u = static_cast<float>(corner & 1 ? b.u1 - 1 : b.u0);
+            const auto v = static_cast<float>(corner & 2 ? b.v1 - 1 : b.v0);
+            const float z = corner & 4 ? b.zMax : b.zMin;
+            const glm::vec3 at = (a0 + au * u + av * v) * z + b0 + bu * u + bv * v;
+            const float scale = camera.orthographic ? 1.0f : 1.0f / at.z;
+            along[corner] = at.z;
+            x[corner] = at.x * scale;
+            y[corner] = at.y * scale;
+        }
+        const auto [x0, x1] = std::ranges::minmax(x);
+        const auto [y0, y1] = std::ranges::minmax(y);
+        const float least = std::ranges::min(along);
+        // What reaches behind the camera is too near to draw an outline.
+        if (!(least > 0)) return;
+        constexpr float kRoom = 1.5f;
+        if (!(x1 >= -kRoom && y1 >= -kRoom && x0 <= static_cast<float>(size.x) + kRoom &&
+              y0 <= static_cast<float>(size.y) + kRoom))
+            return;
+        const int left = static_cast<int>(std::max(0.0f, x0 - kRoom));
+        const int right = static_cast<int>(std::min(static_cast<float>(size.x - 1), x1 + kRoom));
+        const int above = static_cast<int>(std::max(0.0f, y0 - kRoom));
+        const int below = static_cast<int>(std::min(static_cast<float>(size.y - 1), y1 + kRoom));
+        const int endX = right / kTile + 1, endY = below / kTile + 1;
+        if (before.at(endX, endY) - before.at(left / kTile, endY) !=
+            before.at(endX, above / kTile) - before.at(left / kTile, above / kTile))
+            reached[n] = {above, below};
+    });
     for (std::size_t n = 0; n < blocks_.size(); ++n)
         for (int b = reached[n].from / kBandRows; b <= reached[n].to / kBandRows; ++b)
-            if (reached[n].to >= 0 && bands_[static_cast<std::size_t>(b)].any)
-                bands_[static_cast<std::size_t>(b)].blocks.push_back(static_cast<std::uint32_t>(n));
+            if (reached[n].to >= 0 && bands_[b].any)
+                bands_[b].blocks.push_back(static_cast<std::uint32_t>(n));
 }
 
 void Outlines::measureBand(std::size_t n, const Camera& camera, const std::vector<PixelMap>& maps,
@@ -335,17 +330,14 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
     const auto bands = static_cast<std::int64_t>(bands_.size());
     // Pruned views share the surface among them: all are needed.
     const bool choose = set_.views().size() > kMostViews && !set_.pruned();
-    parallelFor(0, bands, [&](std::int64_t n) {
-        beginBand(static_cast<std::size_t>(n), frame, camera, covered, part, choose, tiles);
-    });
+    parallelFor(0, bands,
+                [&](std::size_t n) { beginBand(n, frame, camera, covered, part, choose, tiles); });
     std::vector<PixelMap> maps;
     maps.reserve(set_.rectangles().size());
     for (const PageRectangle& r : set_.rectangles()) maps.push_back(pixelMap(r.window, camera));
     const auto asked = choose ? askedViews(camera) : std::vector<std::uint8_t>();
     findBlocks(camera, maps, asked, tiles, {w, h});
-    parallelFor(0, bands, [&](std::int64_t n) {
-        measureBand(static_cast<std::size_t>(n), camera, maps, covered);
-    });
+    parallelFor(0, bands, [&](std::size_t n) { measureBand(n, camera, maps, covered); });
 }
 
 }  // namespace stx

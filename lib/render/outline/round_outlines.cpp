@@ -49,25 +49,21 @@ void cutRoundOutlines(Outlines& outlines, const Camera& camera, Frame& frame) {
     const int w = frame.depth.width(), h = frame.depth.height();
     constexpr int kRows = 16;
     Image<float> covered(w, h, -1.0f);
-    parallelForBlocks(0, h, kRows, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            const auto colour = frame.colour.row(y);
-            for (int x = 0; x < w; ++x)
-                if (colour[x].w > 0.0f && colour[x].w < kWhole && hasPoint(frame.depth.at(x, y)) &&
-                    turnsAway(frame.depth, camera, x, y))
-                    covered.at(x, y) = Outlines::kAsked;
-        }
+    parallelFor(0, h, kRows, [&](int y) {
+        const auto colour = frame.colour.row(y);
+        for (int x = 0; x < w; ++x)
+            if (colour[x].w > 0.0f && colour[x].w < kWhole && hasPoint(frame.depth.at(x, y)) &&
+                turnsAway(frame.depth, camera, x, y))
+                covered.at(x, y) = Outlines::kAsked;
     });
     outlines.measure(frame, camera, covered);
-    parallelForBlocks(0, h, kRows, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y)
-            forWhere(
-                covered.row(y), [](float c) { return c >= 0.0f; },
-                [&](int x) {
-                    const float share = covered.at(x, y);
-                    if (share - frame.colour.at(x, y).w <= kSmaller)
-                        setCoverage(frame, x, y, share);
-                });
+    parallelFor(0, h, kRows, [&](int y) {
+        forWhere(
+            covered.row(y), [](float c) { return c >= 0.0f; },
+            [&](int x) {
+                const float share = covered.at(x, y);
+                if (share - frame.colour.at(x, y).w <= kSmaller) setCoverage(frame, x, y, share);
+            });
     });
 }
 

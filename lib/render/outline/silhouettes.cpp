@@ -40,10 +40,10 @@ Image<std::uint8_t> alphaOf(const PageSet& set, std::size_t number) {
     for (int y = 0; y < camera.height; ++y) {
         for (int x = 0; x < camera.width; ++x) {
             const PageRectangle* r = set.find(number, x, y);
-            alpha.at(x, y) = static_cast<std::uint8_t>(
-                r ? alphaOf(*set.pages()[static_cast<std::size_t>(r->page)].texture, r->texel(x, y))
-                : set.objectOutside(number, x, y) ? 255
-                                                  : 0);
+            alpha.at(x, y) =
+                static_cast<std::uint8_t>(r ? alphaOf(*set.pages()[r->page].texture, r->texel(x, y))
+                                          : set.objectOutside(number, x, y) ? 255
+                                                                            : 0);
         }
     }
     return alpha;
@@ -129,7 +129,7 @@ float Silhouettes::alphaBilinear(const View& view, double x, double y) const {
         return between(a[0], a[1], b[0], b[1]);
     }
     const PageRectangle* r = set_.find(view.number, ix, iy, ix + 1, iy + 1);
-    const Texture* texture = r ? set_.pages()[static_cast<std::size_t>(r->page)].texture : nullptr;
+    const Texture* texture = r ? set_.pages()[r->page].texture : nullptr;
     const auto at = [&](int i, int j) {
         if (r) return alphaOf(*texture, r->texel(i, j));
         return set_.objectOutside(view.number, i, j) ? 255.0f : 0.0f;
@@ -139,9 +139,9 @@ float Silhouettes::alphaBilinear(const View& view, double x, double y) const {
 
 Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
     std::vector<View> all(set_.views().size());
-    parallelFor(0, static_cast<std::int64_t>(all.size()), [&](std::int64_t n) {
+    parallelFor(0, all.size(), [&](std::size_t n) {
         set_.settle();
-        const auto number = static_cast<std::size_t>(n);
+        const auto number = n;
         if (set_.views()[number].unread) return;
         const Camera& camera = set_.views()[number].camera;
         const int w = camera.width, h = camera.height;
@@ -249,8 +249,8 @@ void Silhouettes::carve(Frame& frame, const Camera& camera, const Extent& drawn)
                                        static_cast<std::size_t>(across));
     };
     const auto inRows = [&](const auto& call) {
-        parallelFor(0, tasks, [&](std::int64_t task) {
-            const int from = part.y0 + static_cast<int>(task) * kRowsPerTask;
+        parallelFor(0, tasks, [&](int task) {
+            const int from = part.y0 + task * kRowsPerTask;
             call(from, std::min(part.y1, from + kRowsPerTask));
         });
     };

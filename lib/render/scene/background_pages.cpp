@@ -22,7 +22,7 @@ std::vector<LitPair> samePoints(const PageSet& a, std::size_t viewA, const PageS
     const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / kLightPoints))));
     std::vector<LitPair> pairs;
     const auto colour = [](const PageSet& set, const PageRectangle& r, int x, int y) {
-        return glm::vec3(set.pages()[static_cast<std::size_t>(r.page)].texture->at(r.texel(x, y)));
+        return glm::vec3(set.pages()[r.page].texture->at(r.texel(x, y)));
     };
     for (int y = step / 2; y < c.height; y += step) {
         for (int x = step / 2; x < c.width; x += step) {
@@ -61,10 +61,10 @@ PageSet PageSet::only(const std::vector<bool>& kept) const {
         const auto first = static_cast<std::uint32_t>(data->rectangles.size());
         for (std::uint32_t k = 0; k < view.rectangleCount; ++k) {
             PageRectangle r = data_->rectangles[view.firstRectangle + k];
-            int& page = pageOf[static_cast<std::size_t>(r.page)];
+            int& page = pageOf[r.page];
             if (page < 0) {
                 page = static_cast<int>(data->pages.size());
-                data->pages.push_back(data_->pages[static_cast<std::size_t>(r.page)]);
+                data->pages.push_back(data_->pages[r.page]);
             }
             r.page = page;
             r.view = static_cast<int>(data->views.size());

@@ -22,8 +22,7 @@ bool samePixel(const PageSet& set, std::size_t a, std::size_t b, int x, int y) {
     if (hasPoint(za) && !(std::abs(za - zb) <= kSameDistance * za)) return false;
     // What is transparent shows no colour: in atlases it has any.
     const auto colour = [&](const PageRectangle& r) {
-        const glm::vec4 c =
-            set.pages()[static_cast<std::size_t>(r.page)].texture->at(r.texel(x, y));
+        const glm::vec4 c = set.pages()[r.page].texture->at(r.texel(x, y));
         return glm::vec4(glm::vec3(c) * c.a, c.a);
     };
     return glm::all(

@@ -14,7 +14,7 @@ PageSet PageSet::inOneLight(const RefineSettings& settings, RefineStepReport& re
     const auto maps = exposureMaps(cameras, [this](std::size_t v, int x0, int y0, int x1, int y1) {
         const PageRectangle* r = find(v, x0, y0, x1, y1);
         if (!r) return PixelPart();
-        const Page& page = pages()[static_cast<std::size_t>(r->page)];
+        const Page& page = pages()[r->page];
         return PixelPart{page.texture, page.depth, r->first, r->stepX, r->stepY};
     });
     std::vector<std::shared_ptr<Texture>> textures(data_->pages.size());

@@ -43,7 +43,7 @@ bool anyValue(const Image<glm::vec3>& image, const PageRectangle& r) {
 
 void PageSet::addRectangle(const AtlasRectangle& from, int padding, Data& data) {
     const auto page = static_cast<std::size_t>(from.page);
-    const Camera& camera = data.views[static_cast<std::size_t>(from.view)].camera;
+    const Camera& camera = data.views[from.view].camera;
     const std::ptrdiff_t stride = data.pages[page].width();
     PageRectangle r;
     r.view = from.view;
@@ -133,13 +133,13 @@ Result<PageSet> PageSet::of(const Atlas& atlas, Job& job) {
     std::stable_sort(sorted.begin(), sorted.end(),
                      [](const auto& a, const auto& b) { return a.view < b.view; });
     for (const AtlasRectangle& r : sorted) {
-        PageView& view = data->views[static_cast<std::size_t>(r.view)];
+        PageView& view = data->views[r.view];
         if (view.rectangleCount++ == 0)
             view.firstRectangle = static_cast<std::uint32_t>(data->rectangles.size());
         addRectangle(r, kPadding, *data);
         // An atlas keeps room for normals and splats when any view has them.
         const PageRectangle& added = data->rectangles.back();
-        const AtlasPage& page = atlas.pages[static_cast<std::size_t>(r.page)];
+        const AtlasPage& page = atlas.pages[r.page];
         if (!page.normal.empty() && !view.hasNormals)
             view.hasNormals = anyValue(page.normal, added);
         if (!page.splatU.empty() && !view.hasSplats)
@@ -149,10 +149,8 @@ Result<PageSet> PageSet::of(const Atlas& atlas, Job& job) {
     PageSet set(data);
     if (atlas.keptPixels < atlas.sourcePixels) {
         std::vector<std::vector<std::uint64_t>> bits(data->views.size());
-        parallelFor(0, static_cast<std::int64_t>(bits.size()), [&](std::int64_t i) {
-            const auto view = static_cast<std::size_t>(i);
-            bits[view] = outsideBits(atlas, view);
-        });
+        parallelFor(0, bits.size(),
+                    [&](std::size_t view) { bits[view] = outsideBits(atlas, view); });
         for (std::size_t i = 0; i < bits.size(); ++i) data->index[i].outside = std::move(bits[i]);
     }
     STX_CHECK(job.checkCancelled());
@@ -201,7 +199,7 @@ bool PageSet::exactDepth() const {
 std::int64_t PageSet::pointCount() const {
     std::int64_t n = 0;
     for (const PageRectangle& r : rectangles()) {
-        const Image<float>& depth = *pages()[static_cast<std::size_t>(r.page)].depth;
+        const Image<float>& depth = *pages()[r.page].depth;
         for (int y = r.pageY; y < r.pageY + r.height; ++y)
             for (int x = r.pageX; x < r.pageX + r.width; ++x) n += hasPoint(depth.at(x, y)) ? 1 : 0;
     }
@@ -212,7 +210,7 @@ Bounds PageSet::bounds() const {
     if (data_->bounds) return *data_->bounds;
     Bounds bounds;
     for (const PageRectangle& r : rectangles()) {
-        const Image<float>& depth = *pages()[static_cast<std::size_t>(r.page)].depth;
+        const Image<float>& depth = *pages()[r.page].depth;
         const Camera& c = r.window;
         for (int j = 0; j < r.height; ++j) {
             for (int i = 0; i < r.width; ++i) {
@@ -232,7 +230,7 @@ Texture PageSet::textureOfView(std::size_t number) const {
             for (int x = 0; x < camera.width; ++x)
                 if (objectOutside(number, x, y)) image.at(x, y).a = full;
         for (const PageRectangle& r : rectanglesOf(number)) {
-            const auto* texels = texelsOf(*pages()[static_cast<std::size_t>(r.page)].texture);
+            const auto* texels = texelsOf(*pages()[r.page].texture);
             const int padding = views()[number].whole ? 0 : data_->padding;
             const int x0 = std::max(r.x0 - padding, 0), y0 = std::max(r.y0 - padding, 0);
             const int x1 = std::min(r.x1 + padding, camera.width);
@@ -265,7 +263,7 @@ ReferenceView PageSet::copyOfView(std::size_t number) const {
         for (int x = 0; x < width; ++x) {
             const PageRectangle* r = find(number, x, y);
             if (!r) continue;
-            const Page& page = pages()[static_cast<std::size_t>(r->page)];
+            const Page& page = pages()[r->page];
             const std::size_t texel = r->texel(x, y);
             view.depth.at(x, y) = page.depth->data()[texel];
             if (from.hasNormals) view.normal.at(x, y) = page.normal->data()[texel];

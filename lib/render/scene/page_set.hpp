@@ -204,13 +204,12 @@ class PageSet {
     [[nodiscard]] float alpha(std::size_t view, int x, int y) const {
         const PageRectangle* r = find(view, x, y);
         if (!r) return objectOutside(view, x, y) ? 1.0f : 0.0f;
-        return pages()[static_cast<std::size_t>(r->page)].texture->alpha(r->texel(x, y));
+        return pages()[r->page].texture->alpha(r->texel(x, y));
     }
     /// Distance; kNoDepth where there is no point.
     [[nodiscard]] float depth(std::size_t view, int x, int y) const {
         const PageRectangle* r = find(view, x, y);
-        return r ? pages()[static_cast<std::size_t>(r->page)].depth->data()[r->texel(x, y)]
-                 : kNoDepth;
+        return r ? pages()[r->page].depth->data()[r->texel(x, y)] : kNoDepth;
     }
     /// The texture of one view, as large as the view. Pixels that no rectangle shows are black;
     /// they have full alpha where objectOutside().

@@ -10,13 +10,13 @@ namespace stx {
 RefineView viewImages(const PageSet& set, std::size_t number, ReferenceView& copy) {
     const PageView& view = set.views()[number];
     if (view.whole) {
-        const Page& page = set.pages()[static_cast<std::size_t>(set.rectanglesOf(number)[0].page)];
+        const Page& page = set.pages()[set.rectanglesOf(number)[0].page];
         return {&view, page.texture, page.depth};
     }
     copy.texture = set.textureOfView(number);
     copy.depth = Image<float>(view.camera.width, view.camera.height, kNoDepth);
     for (const PageRectangle& r : set.rectanglesOf(number)) {
-        const float* depth = set.pages()[static_cast<std::size_t>(r.page)].depth->data();
+        const float* depth = set.pages()[r.page].depth->data();
         for (int y = r.y0; y < r.y1; ++y)
             for (int x = r.x0; x < r.x1; ++x) copy.depth.at(x, y) = depth[r.texel(x, y)];
     }
@@ -51,8 +51,7 @@ bool PageSet::mayRefine(const RefineSettings& settings) const {
     };
     // Views in rectangles are copied; one at a time, since a copy takes the memory of a whole view.
     if (views().front().whole)
-        parallelFor(0, static_cast<std::int64_t>(ofViews.size()),
-                    [&](std::int64_t i) { look(static_cast<std::size_t>(i)); });
+        parallelFor(0, ofViews.size(), [&](std::size_t i) { look(i); });
     else
         for (std::size_t i = 0; i < ofViews.size(); ++i) look(i);
     RefineNeeds needs(left);
@@ -73,8 +72,7 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report,
     if (!whole && !mayRefine(left)) return *this;
     std::vector<ReferenceView> copies(views().size());
     std::vector<RefineView> given(views().size());
-    parallelFor(0, static_cast<std::int64_t>(given.size()), [&](std::int64_t i) {
-        const auto number = static_cast<std::size_t>(i);
+    parallelFor(0, given.size(), [&](std::size_t number) {
         given[number] = viewImages(*this, number, copies[number]);
     });
     auto better = refineDepth(given, left, found, {spool(), atOnce});
@@ -86,7 +84,7 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report,
         better[i].giveTo(data->views[i]);
         if (!better[i].depth) continue;
         for (const PageRectangle& r : rectanglesOf(i)) {
-            auto& depth = depths[static_cast<std::size_t>(r.page)];
+            auto& depth = depths[r.page];
             const auto page = static_cast<std::size_t>(r.page);
             if (views()[i].whole) {
                 depth = std::make_shared<Image<float>>(std::move(*better[i].depth));

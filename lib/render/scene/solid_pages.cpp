@@ -30,8 +30,7 @@ Image<std::uint8_t> translucentInside(const Texture& texture, const Image<float>
             any |= static_cast<int>(static_cast<std::uint8_t>(p.a - 1) < 254);
         return any != 0;
     };
-    parallelFor(kInside, h - kInside, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(kInside, h - kInside, [&](int y) {
         if (!mayBeTranslucent(y)) return;
         for (int x = kInside; x + kInside < w; ++x) {
             if (!isTranslucent(x, y)) continue;
@@ -52,8 +51,7 @@ Image<std::uint8_t> widened(const Image<std::uint8_t>& from) {
     Image<std::uint8_t> across(w, h, std::uint8_t{0}), out(w, h, std::uint8_t{0});
     const auto spread = [&](const Image<std::uint8_t>& in, Image<std::uint8_t>& to, int stepX,
                             int stepY) {
-        parallelFor(0, h, [&](std::int64_t row) {
-            const int y = static_cast<int>(row);
+        parallelFor(0, h, [&](int y) {
             for (int x = 0; x < w; ++x) {
                 std::uint8_t any = 0;
                 for (int k = -kReach; k <= kReach; ++k) {

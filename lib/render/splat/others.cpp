@@ -188,8 +188,8 @@ void findOthers(const PageSet& set, PreparedPages& prepared) {
             lookups.emplace_back(set, prepared, views[n]);
             maps.push_back(pixelMap(own, camera));
         }
-        const Page& page = set.pages()[static_cast<std::size_t>(r.page)];
-        const auto& slopes = prepared.pages[static_cast<std::size_t>(r.page)].slopes;
+        const Page& page = set.pages()[r.page];
+        const auto& slopes = prepared.pages[r.page].slopes;
         const auto spacing = static_cast<float>(1.0 / std::min(own.fx, own.fy));
         const auto find = [&](std::int64_t from, std::int64_t to) {
             for (auto k = static_cast<std::size_t>(from); k < static_cast<std::size_t>(to); ++k) {
@@ -209,7 +209,7 @@ void findOthers(const PageSet& set, PreparedPages& prepared) {
                 }
             }
         };
-        parallelForBlocks(0, static_cast<std::int64_t>(rectangle.blocks.size()), 32, find);
+        parallelForBlocks(0, rectangle.blocks.size(), 32, find);
     }
 }
 

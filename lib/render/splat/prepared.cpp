@@ -106,8 +106,8 @@ struct Window {
 
     Window(const PageSet& set, const PageRectangle& r)
         : rectangle(r),
-          view(set.views()[static_cast<std::size_t>(r.view)]),
-          page(set.pages()[static_cast<std::size_t>(r.page)]),
+          view(set.views()[r.view]),
+          page(set.pages()[r.page]),
           origin(static_cast<std::ptrdiff_t>(r.pageY) * page.width() + r.pageX),
           stride(page.width()) {}
 
@@ -239,8 +239,8 @@ void prepareRow(const Window& w, const glm::mat3& cameraFromWorld, int y, Normal
         out.slopes[i] = {flagged(coded(slope.x), around.linked),
                          flagged(coded(slope.y), around.rim)};
         if (normals) {
-            normals->slopeX[static_cast<std::size_t>(x)] = slope.x;
-            normals->slopeY[static_cast<std::size_t>(x)] = slope.y;
+            normals->slopeX[x] = slope.x;
+            normals->slopeY[x] = slope.y;
         }
     }
     if (!normals) return;
@@ -312,12 +312,12 @@ PreparedPages preparePages(const PageSet& set, bool wantNormals) {
     }
     for (const PageRectangle& rectangle : set.rectangles()) {
         set.settle();
-        if (set.views()[static_cast<std::size_t>(rectangle.view)].unread) {
+        if (set.views()[rectangle.view].unread) {
             out.rectangles.emplace_back().rectangle = &rectangle;
             continue;
         }
         const Window w(set, rectangle);
-        PreparedPage& page = out.pages[static_cast<std::size_t>(rectangle.page)];
+        PreparedPage& page = out.pages[rectangle.page];
         const glm::mat3 cameraFromWorld(
             glm::mat3_cast(glm::conjugate(rectangle.window.orientation)));
         parallelForBlocks(0, rectangle.height, 16, [&](std::int64_t from, std::int64_t to) {
@@ -330,8 +330,7 @@ PreparedPages preparePages(const PageSet& set, bool wantNormals) {
         const int rows = (rectangle.height + kBlock - 1) / kBlock;
         std::vector<std::vector<BlockInfo>> perRow(static_cast<std::size_t>(rows));
         parallelFor(0, rows, [&](std::int64_t r) {
-            perRow[static_cast<std::size_t>(r)] =
-                blocksOfRow(w, page, static_cast<int>(r) * kBlock);
+            perRow[r] = blocksOfRow(w, page, static_cast<int>(r) * kBlock);
         });
         PreparedRectangle& prepared = out.rectangles.emplace_back();
         prepared.rectangle = &rectangle;

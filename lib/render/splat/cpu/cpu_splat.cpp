@@ -130,7 +130,7 @@ void CpuSplatRenderer::planFrame(const Camera& camera) {
     sources_.clear();
     for (const PageRectangle& r : set_.rectangles()) {
         const auto page = static_cast<std::size_t>(r.page);
-        if (set_.views()[static_cast<std::size_t>(r.view)].unread) {
+        if (set_.views()[r.view].unread) {
             sources_.emplace_back();
             continue;
         }
@@ -139,16 +139,12 @@ void CpuSplatRenderer::planFrame(const Camera& camera) {
     std::size_t first = 0;
     for (std::size_t k = 0; k < prepared_.rectangles.size(); ++k) {
         const auto& info = prepared_.rectangles[k];
-        parallelForBlocks(0, static_cast<std::int64_t>(info.blocks.size()), 512,
-                          [&](std::int64_t from, std::int64_t to) {
-                              for (auto i = from; i < to; ++i) {
-                                  BlockTask& task = tasks_[first + i];
-                                  task.source = static_cast<std::uint32_t>(k);
-                                  seen_[first + i] =
-                                      planBlock(info, info.blocks[i], sources_[k], camera,
-                                                settings_.splat == SplatRule::data, task);
-                              }
-                          });
+        parallelFor(0, info.blocks.size(), 512, [&](std::int64_t i) {
+            BlockTask& task = tasks_[first + i];
+            task.source = static_cast<std::uint32_t>(k);
+            seen_[first + i] = planBlock(info, info.blocks[i], sources_[k], camera,
+                                         settings_.splat == SplatRule::data, task);
+        });
         first += info.blocks.size();
     }
 }
@@ -162,9 +158,7 @@ std::span<const std::uint32_t> CpuSplatRenderer::byColumn(int width) {
     for (std::size_t k = 1; k < first.size(); ++k) first[k] += first[k - 1];
     order_.resize(first.back());
     for (std::size_t i = 0; i < tasks_.size(); ++i)
-        if (seen_[i])
-            order_[first[static_cast<std::size_t>(tasks_[i].x0 / kColumn)]++] =
-                static_cast<std::uint32_t>(i);
+        if (seen_[i]) order_[first[tasks_[i].x0 / kColumn]++] = static_cast<std::uint32_t>(i);
     return order_;
 }
 
@@ -218,12 +212,12 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
         }
         for (int y = y0 / kRegionRows; y <= y1 / kRegionRows; ++y)
             for (int x = x0 / kRegionWidth; x <= x1 / kRegionWidth; ++x)
-                bins_[static_cast<std::size_t>(y * picture.across + x)].push_back(i);
+                bins_[y * picture.across + x].push_back(i);
     }
     {
         const StageTimer timer(settings_.log.get(), "draw");
-        parallelFor(0, regions, [&](std::int64_t n) {
-            drawRegion(picture, static_cast<int>(n));
+        parallelFor(0, regions, [&](int n) {
+            drawRegion(picture, n);
             set_.settle();
         });
     }
@@ -278,7 +272,7 @@ void CpuSplatRenderer::drawRegion(Picture& picture, int index) {
     region.rows = std::min(kRegionRows, camera.height - region.top);
     region.stride = region.width + 2;
     region.orthographic = camera.orthographic;
-    const auto& bin = bins_[static_cast<std::size_t>(index)];
+    const auto& bin = bins_[index];
     if (bin.empty()) {
         for (int y = region.top; y < region.top + region.rows; ++y) {
             const auto fill = [&](auto& image, auto value) {

@@ -12,8 +12,7 @@ Image<glm::vec3> normalsOf(const ReferenceView& view) {
     const Camera& camera = view.camera;
     const DepthSurface surface = depthSurface(view, BakeSettings{});
     Image<glm::vec3> out(camera.width, camera.height, glm::vec3(0));
-    parallelFor(0, camera.height, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
+    parallelFor(0, camera.height, [&](int y) {
         for (int x = 0; x < camera.width; ++x) {
             if (!hasPoint(view.depth.at(x, y))) continue;
             out.at(x, y) =
@@ -38,7 +37,7 @@ PointArrays makePointArrays(const PageSet& set, bool lit) {
         Image<glm::vec3> made;
         if (lit && !view.hasNormals) made = normalsOf(set.copyOfView(i));
         for (const PageRectangle& r : set.rectanglesOf(i)) {
-            const Page& page = set.pages()[static_cast<std::size_t>(r.page)];
+            const Page& page = set.pages()[r.page];
             for (int y = r.y0; y < r.y1; ++y) {
                 for (int x = r.x0; x < r.x1; ++x) {
                     const std::size_t texel = r.texel(x, y);
@@ -108,7 +107,7 @@ void groupPoints(const PointArrays& points, const RenderSettings& settings, cons
         out.indices[next[sizes[i]]++] = static_cast<std::uint32_t>(i);
     out.groups.clear();
     for (int s = 1; s <= top; ++s) {
-        const std::size_t first = start[static_cast<std::size_t>(s)];
+        const std::size_t first = start[s];
         const std::size_t n = start[static_cast<std::size_t>(s) + 1] - first;
         if (n > 0) out.groups.push_back({s, first, n});
     }

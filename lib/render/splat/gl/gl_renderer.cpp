@@ -152,21 +152,16 @@ void GlRenderer::setLights(const Camera& camera) const {
 void GlRenderer::lightPoints(const Camera& camera) {
     const Lighting world = lightsInWorld(settings_.lighting, camera.worldFromCamera());
     litColours_ = points_.coloursF;
-    parallelForBlocks(
-        0, static_cast<std::int64_t>(litColours_.size()), 4096,
-        [&](std::int64_t begin, std::int64_t end) {
-            for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
-                const glm::vec3 normal = points_.normals[i];
-                if (normal == glm::vec3(0)) continue;
-                const glm::dvec3 place = points_.centre + glm::dvec3(points_.positions[i]);
-                const glm::dvec3 toEye =
-                    camera.orthographic ? -camera.forward() : camera.position - place;
-                litColours_[i] = glm::vec4(
-                    shadePhong(world, glm::vec3(litColours_[i]), glm::vec3(place),
-                               glm::normalize(normal), glm::vec3(glm::normalize(toEye)), true),
-                    1.0f);
-            }
-        });
+    parallelFor(0, litColours_.size(), 4096, [&](std::size_t i) {
+        const glm::vec3 normal = points_.normals[i];
+        if (normal == glm::vec3(0)) return;
+        const glm::dvec3 place = points_.centre + glm::dvec3(points_.positions[i]);
+        const glm::dvec3 toEye = camera.orthographic ? -camera.forward() : camera.position - place;
+        litColours_[i] =
+            glm::vec4(shadePhong(world, glm::vec3(litColours_[i]), glm::vec3(place),
+                                 glm::normalize(normal), glm::vec3(glm::normalize(toEye)), true),
+                      1.0f);
+    });
 }
 
 void GlRenderer::drawGroups(bool lit) const {
@@ -213,9 +208,9 @@ void GlRenderer::drawGroups(bool lit) const {
 void GlRenderer::readColours(Image<glm::vec4>& to) const {
     glReadPixels(0, 0, to.width(), to.height(), GL_RGBA, GL_FLOAT, to.data());
     if (!points_.decoded) return;
-    parallelFor(0, to.height(), [&](std::int64_t row) {
+    parallelFor(0, to.height(), [&](int row) {
         for (int x = 0; x < to.width(); ++x) {
-            glm::vec4& c = to.at(x, static_cast<int>(row));
+            glm::vec4& c = to.at(x, row);
             for (int i = 0; i < 3; ++i) c[i] = srgbByTable(c[i]);
         }
     });

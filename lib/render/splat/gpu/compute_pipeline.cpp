@@ -148,7 +148,7 @@ Result<void> ComputeSplats::cull(SplatFrame& frame) {
 Result<void> ComputeSplats::resolve(SplatFrame& frame, int slot) {
     const glm::ivec2 size(frame.uniforms.frameSize);
     const std::int64_t pixels = static_cast<std::int64_t>(size.x) * size.y;
-    Slot& to = slots_[static_cast<std::size_t>(slot)];
+    Slot& to = slots_[slot];
     colour_.reserve(pixels * 16);
     depth_.reserve(pixels * 4);
     if (variant_.normals) {
@@ -205,7 +205,7 @@ Result<void> ComputeSplats::draw(SplatFrame& frame, int slot) {
 }
 
 Result<SplatPlanes> ComputeSplats::map(int slot) {
-    Slot& from = slots_[static_cast<std::size_t>(slot)];
+    Slot& from = slots_[slot];
     STX_CHECK(from.back.wait(context_));
     return SplatPlanes::in(from.back.memory, from.pixels, variant_.normals);
 }

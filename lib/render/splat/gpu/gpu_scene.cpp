@@ -96,8 +96,8 @@ Result<GpuScene> GpuScene::upload(const PageSet& set, const EglContext& context,
     std::vector<glm::ivec3> cells;
     for (int i = 0; i < count; ++i) {
         STX_CHECK(job.checkCancelled());
-        const Page& page = set.pages()[static_cast<std::size_t>(i)];
-        splat::PreparedPage& ready = prepared.pages[static_cast<std::size_t>(i)];
+        const Page& page = set.pages()[i];
+        splat::PreparedPage& ready = prepared.pages[i];
         const glm::ivec3 cell((i % perLayer % layout.grid.x) * layout.cell.x,
                               (i % perLayer / layout.grid.x) * layout.cell.y, i / perLayer);
         cells.push_back(cell);
@@ -133,8 +133,7 @@ Result<GpuScene> GpuScene::upload(const PageSet& set, const EglContext& context,
     scene.rectangles = std::move(prepared.rectangles);
     for (const splat::PreparedRectangle& r : scene.rectangles) {
         const PageRectangle& at = *r.rectangle;
-        scene.places.push_back(cells[static_cast<std::size_t>(at.page)] +
-                               glm::ivec3(at.pageX, at.pageY, 0));
+        scene.places.push_back(cells[at.page] + glm::ivec3(at.pageX, at.pageY, 0));
         for (const auto& block : r.blocks) scene.translucent = scene.translucent || !block.opaque;
     }
     scene.points = set.pointCount();

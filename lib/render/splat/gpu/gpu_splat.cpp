@@ -133,14 +133,12 @@ Result<void> GpuSplatRenderer::finish(const Begun& begun, glm::ivec2 at, Frame& 
         std::copy_n(from + static_cast<std::size_t>(y) * width, width,
                     image.row(at.y + y).data() + at.x);
     };
-    parallelForBlocks(0, begun.camera.height, 32, [&](std::int64_t first, std::int64_t end) {
-        for (int y = static_cast<int>(first); y < end; ++y) {
-            copy(planes.colour, frame.colour, y);
-            copy(planes.depth, frame.depth, y);
-            if (!planes.normal) continue;
-            copy(planes.normal, frame.normal, y);
-            copy(planes.albedo, frame.albedo, y);
-        }
+    parallelFor(0, begun.camera.height, 32, [&](int y) {
+        copy(planes.colour, frame.colour, y);
+        copy(planes.depth, frame.depth, y);
+        if (!planes.normal) return;
+        copy(planes.normal, frame.normal, y);
+        copy(planes.albedo, frame.albedo, y);
     });
     resources_->pipeline->unmap(begun.slot);
     return context_->check("reading the frame back");
@@ -150,9 +148,7 @@ Result<void> GpuSplatRenderer::renderWhole(const Camera& camera, const std::opti
                                            Frame& frame) {
     auto begun = std::exchange(begun_, std::nullopt);
     // A frame that nobody asks for is overwritten, in the order of the commands.
-    if (!begun || begun->camera != camera) {
-        STX_TRY(begun, begin(camera, 0));
-    }
+    if (!begun || begun->camera != camera) STX_SET(begun, begin(camera, 0));
     beginExpected(next, 1 - begun->slot);
     return finish(*begun, {0, 0}, frame);
 }

@@ -212,7 +212,7 @@ Result<void> RasterSplats::resolve(SplatFrame& frame, int slot) {
     setDraw(0, frame.uniforms);
     glDrawArrays(GL_TRIANGLES, 0, 3);
 
-    Slot& to = slots_[static_cast<std::size_t>(slot)];
+    Slot& to = slots_[slot];
     to.pixels = static_cast<std::int64_t>(size.x) * size.y;
     const std::int64_t wanted = to.pixels * (variant_.normals ? 48 : 20);
     if (!to.back) to.back = GlBuffer::generate();
@@ -273,7 +273,7 @@ Result<void> RasterSplats::draw(SplatFrame& frame, int slot) {
 }
 
 Result<SplatPlanes> RasterSplats::map(int slot) {
-    Slot& from = slots_[static_cast<std::size_t>(slot)];
+    Slot& from = slots_[slot];
     STX_CHECK(waitFor(from.done, context_));
     glBindBuffer(GL_PIXEL_PACK_BUFFER, from.back.get());
     const auto* at = static_cast<const std::byte*>(glMapBufferRange(
@@ -287,7 +287,7 @@ Result<SplatPlanes> RasterSplats::map(int slot) {
 }
 
 void RasterSplats::unmap(int slot) {
-    glBindBuffer(GL_PIXEL_PACK_BUFFER, slots_[static_cast<std::size_t>(slot)].back.get());
+    glBindBuffer(GL_PIXEL_PACK_BUFFER, slots_[slot].back.get());
     glUnmapBuffer(GL_PIXEL_PACK_BUFFER);
     glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
 }

@@ -74,15 +74,12 @@ struct Planned {
 void planBlocks(const splat::PreparedRectangle& info, const splat::RectangleImages& source,
                 const Camera& novel, SplatRule rule, std::vector<Planned>& planned) {
     planned.assign(info.blocks.size(), {});
-    parallelForBlocks(0, static_cast<std::int64_t>(planned.size()), 512,
-                      [&](std::int64_t from, std::int64_t to) {
-                          for (auto i = from; i < to; ++i) {
-                              Planned& p = planned[i];
-                              p.seen = splat::planBlock(info, info.blocks[i], source, novel,
-                                                        rule == SplatRule::data, p.task);
-                              if (p.seen) p.density = density(info, info.blocks[i], p.task, novel);
-                          }
-                      });
+    parallelFor(0, planned.size(), 512, [&](std::int64_t i) {
+        Planned& p = planned[i];
+        p.seen =
+            splat::planBlock(info, info.blocks[i], source, novel, rule == SplatRule::data, p.task);
+        if (p.seen) p.density = density(info, info.blocks[i], p.task, novel);
+    });
 }
 
 /// The pixels from `begin` to `end` of a block of rectangle `k`, whose images lie at `place`.
