@@ -465,7 +465,7 @@ def model_of_few(args, folder):
         line = ["extract", f"many36{kind}", "--threads", "2"] + options.split() + ["-o"]
         every = must([args.stx] + line + ["all." + ending, "--max-memory", "16384"], folder)
         few = must([args.stx] + line + ["few." + ending, "--max-memory", str(limit)], folder)
-        models = [open(os.path.join(folder, f"{which}.{ending}"), "rb").read() for which in ("all", "few")]
+        models = [files_of(os.path.join(folder, f"{which}.{ending}")) for which in ("all", "few")]
         peak = few.usage.ru_maxrss / 1024
         if args.measure:
             print(f"{name:46} {peak:6.1f} MiB, in memory {every.usage.ru_maxrss / 1024:6.1f}", flush=True)
