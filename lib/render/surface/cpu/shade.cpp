@@ -368,8 +368,8 @@ HWY_INLINE void findTaps(const Group& g, const ShadeSource& source, int s, float
         if (l >= g.count || !(view.weight[l] > 0.0f)) continue;
         alignas(16) float mask[kTaps * kTaps];
         maskTaps(source, g, l, view.u[l], view.v[l], view, static_cast<int>(t.bases[s][0][l]),
-                 static_cast<int>(t.bases[s][1][l]),
-                 mixedTap(*source.source, view, l, edgeWeight), mask);
+                 static_cast<int>(t.bases[s][1][l]), mixedTap(*source.source, view, l, edgeWeight),
+                 mask);
         for (int i = 0; i < kTaps * kTaps; ++i) t.masks[s][i][l] = mask[i];
     }
 }
