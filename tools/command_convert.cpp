@@ -221,7 +221,7 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
     }
     if (o.environment.given()) {
         STX_TRY(auto environment, environmentOf(o.environment, program.job));
-        frames = withEnvironment(std::move(frames), std::move(environment));
+        frames = inEnvironment(std::move(frames), std::move(environment));
     }
     noteUnused(input, Reads::film, o, program);
     Converted done;

@@ -325,8 +325,8 @@ std::unique_ptr<Sequence> changedByView(std::unique_ptr<Sequence> frames, ViewCh
     return std::make_unique<ChangedByView>(std::move(frames), std::move(change));
 }
 
-std::unique_ptr<Sequence> withEnvironment(std::unique_ptr<Sequence> frames,
-                                          std::shared_ptr<const Environment> environment) {
+std::unique_ptr<Sequence> inEnvironment(std::unique_ptr<Sequence> frames,
+                                        std::shared_ptr<const Environment> environment) {
     return std::make_unique<InEnvironment>(std::move(frames), std::move(environment));
 }
 

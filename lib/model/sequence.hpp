@@ -98,7 +98,7 @@ class Sequence {
                                                       ViewChange change);
 
 /// The same frames with another environment, which may be null.
-[[nodiscard]] std::unique_ptr<Sequence> withEnvironment(
+[[nodiscard]] std::unique_ptr<Sequence> inEnvironment(
     std::unique_ptr<Sequence> frames, std::shared_ptr<const Environment> environment);
 
 /// The same frames; `look` is called, from any thread, with each view that is asked for, each time.
