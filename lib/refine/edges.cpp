@@ -56,6 +56,10 @@ constexpr float kFrontInOthers = 0.52f;
 /// with edges moved by a pixel to 0.36, 0.54 and 0.21.
 constexpr float kFrontInAgreeing = 0.4f, kSamePlaceOfPixel = 0.05f;
 constexpr int kFewWitnesses = 20;
+/// Fewer than those tell only that edges are not fat: from so many on, with more than
+/// kFrontInAgreeing. Bars two pixels thick have 16 of 19 and 5 of 10 (tests/sweep, 1127800:175 and
+/// 1127900:0).
+constexpr int kFewestWitnesses = 5;
 /// Pixels at edges beside which none tell colours are mostly fat where so many times as many have
 /// their colours behind as in front, in other views: 2.8 of the statue, 1.8 of the oak tree, 5 and
 /// more of rooms; 0.2 to 0.7 of bars three to ten pixels thick, each with edges moved by a pixel
@@ -422,7 +426,8 @@ bool othersShowTheFront(std::span<const EdgeView> views) {
         return static_cast<float>(sum.front) > share * static_cast<float>(sum.asked);
     };
     const bool tell = sum.asked >= kFewWitnesses;
-    if (tell && shareAbove(kFrontInOthers)) return true;
+    if (sum.asked >= kFewestWitnesses && shareAbove(tell ? kFrontInOthers : kFrontInAgreeing))
+        return true;
     if (tell && !shareAbove(kFrontInAgreeing)) return false;
     return sum.off.size() >= static_cast<std::size_t>(kFewWitnesses) &&
            lowerQuartile(sum.off) < kSamePlaceOfPixel;
