@@ -28,14 +28,14 @@ namespace stx {
            same(a.metallicRoughness, b.metallicRoughness) && same(a.emissive, b.emissive);
 }
 
-/// A hash of bytes, which differs but once in 2^64 where they do.
+/// A hash of bytes. That of other bytes is another, but for about one in 2^64.
 [[nodiscard]] inline std::size_t hashOf(std::span<const std::byte> bytes) {
     return std::hash<std::string_view>()(
         {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 /// What is kept of a view to know its images again when they are not in memory any more: equal
-/// where samePictures() says so of views of one size; hashes (hashOf()) stand for the pixels.
+/// where samePictures() says so of views of one size. Of the pixels it has their hashes, hashOf().
 struct PicturesKey {
     bool pruned = false, linear = false;
     NoDepth noDepth = NoDepth::empty;

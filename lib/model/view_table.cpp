@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "lib/base/parallel_try.hpp"
+#include "lib/model/views_over.hpp"
 
 namespace stx {
 
@@ -93,70 +94,53 @@ std::vector<ViewImageKinds> kindsOf(const Bundle& bundle) {
     return kinds;
 }
 
-/// A view to change: itself where nobody else has it, else a copy.
-std::shared_ptr<ReferenceView> ownView(std::shared_ptr<const ReferenceView> view) {
-    if (view.use_count() == 1) return std::const_pointer_cast<ReferenceView>(std::move(view));
-    return std::make_shared<ReferenceView>(*view);
-}
-
-class ChangedViews : public ViewTable {
+class ChangedViews : public ViewsOver {
   public:
     ChangedViews(std::unique_ptr<ViewTable> table, std::vector<ViewImageKinds> kinds,
                  ViewChange change)
         // What a change may do to the planes shows in its views only.
-        : ViewTable(headersOf(std::as_const(*table).about()), std::move(kinds), Planes::withPixels),
-          table_(std::move(table)),
+        : ViewsOver(*table, std::move(table), headersOf(std::as_const(*table).about()),
+                    std::move(kinds), Planes::withPixels),
           change_(std::move(change)) {
         if (change_.header)
             for (ReferenceView& view : about().views) change_.header(view);
     }
 
-    std::uint64_t bytesHeld() const override { return table_->bytesHeld(); }
     std::uint64_t bytesToMake(std::size_t index) const override {
         const std::uint64_t each = change_.takes.perPixel + change_.takes.perPixelOfLargest;
-        return std::max(table_->bytesToMake(index),
-                        table_->bytesOf(index) + each * pixelsOf(index));
+        return std::max(table_.bytesToMake(index), table_.bytesOf(index) + each * pixelsOf(index));
     }
     std::vector<ViewSummary> summaries() const override {
-        return change_.keepsPixels ? table_->summaries() : std::vector<ViewSummary>();
+        return change_.keepsPixels ? table_.summaries() : std::vector<ViewSummary>();
     }
-    std::string where() const override { return table_->where(); }
-    bool knownSound() const override { return table_->knownSound(); }
-    int mostAtOnce() const override { return table_->mostAtOnce(); }
 
   protected:
     Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
-        STX_TRY(auto read, table_->view(index, job));
-        auto view = ownView(std::move(read));
+        STX_TRY(auto read, table_.view(index, job));
+        auto view = toChange(std::move(read));
         STX_CHECK(within(fmt::format("view {}", index), change_.change(*view, job)));
         return view;
     }
 
   private:
-    std::unique_ptr<ViewTable> table_;
     ViewChange change_;
 };
 
-class OtherHeaders : public ViewTable {
+class OtherHeaders : public ViewsOver {
   public:
     OtherHeaders(std::unique_ptr<ViewTable> table, const std::vector<ViewHeader>& headers)
-        : ViewTable(headersOf(std::as_const(*table).about()), table->kinds()),
-          table_(std::move(table)) {
+        : ViewsOver(std::move(table), Planes::known) {
         for (std::size_t i = 0; i < count(); ++i) setHeader(about().views[i], headers[i]);
     }
 
-    std::uint64_t bytesHeld() const override { return table_->bytesHeld(); }
     std::uint64_t bytesToMake(std::size_t index) const override {
-        return std::max(table_->bytesToMake(index), bytesOf(index));
+        return std::max(table_.bytesToMake(index), bytesOf(index));
     }
-    std::string where() const override { return table_->where(); }
-    bool knownSound() const override { return table_->knownSound(); }
-    int mostAtOnce() const override { return table_->mostAtOnce(); }
 
   protected:
     Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
-        STX_TRY(auto read, table_->view(index, job));
-        auto view = ownView(std::move(read));
+        STX_TRY(auto read, table_.view(index, job));
+        auto view = toChange(std::move(read));
         setHeader(*view, about().views[index]);
         return view;
     }
@@ -169,38 +153,28 @@ class OtherHeaders : public ViewTable {
         own.colourFile = std::move(view.colourFile);
         static_cast<ViewHeader&>(view) = std::move(own);
     }
-
-    std::unique_ptr<ViewTable> table_;
 };
 
-class WatchedViews : public ViewTable {
+class WatchedViews : public ViewsOver {
   public:
     WatchedViews(std::unique_ptr<ViewTable> table,
                  std::function<void(std::size_t, const ReferenceView&)> look)
-        : ViewTable(headersOf(std::as_const(*table).about()), table->kinds(),
-                    table->planesKnown() ? Planes::known : Planes::withPixels),
-          table_(std::move(table)),
-          look_(std::move(look)) {}
+        : ViewsOver(std::move(table), planesOf(*table)), look_(std::move(look)) {}
 
-    std::uint64_t bytesHeld() const override { return table_->bytesHeld(); }
-    std::uint64_t bytesGiven(std::size_t index) const override { return table_->bytesGiven(index); }
+    std::uint64_t bytesGiven(std::size_t index) const override { return table_.bytesGiven(index); }
     std::uint64_t bytesToMake(std::size_t index) const override {
-        return table_->bytesToMake(index);
+        return table_.bytesToMake(index);
     }
-    std::vector<ViewSummary> summaries() const override { return table_->summaries(); }
-    std::string where() const override { return table_->where(); }
-    bool knownSound() const override { return table_->knownSound(); }
-    int mostAtOnce() const override { return table_->mostAtOnce(); }
+    std::vector<ViewSummary> summaries() const override { return table_.summaries(); }
 
   protected:
     Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
-        STX_TRY(auto view, table_->view(index, job));
+        STX_TRY(auto view, table_.view(index, job));
         look_(index, *view);
         return view;
     }
 
   private:
-    std::unique_ptr<ViewTable> table_;
     std::function<void(std::size_t, const ReferenceView&)> look_;
 };
 
@@ -285,7 +259,7 @@ Result<Bundle> someViews(
         STX_CHECK(job.checkCancelled());
         STX_TRY(auto view, table.view(index, job));
         if (look) STX_CHECK(look(index, *view));
-        bundle.views[index] = std::move(*ownView(std::move(view)));
+        bundle.views[index] = std::move(*toChange(std::move(view)));
         bundle.views[index].moveTo(spool);
         job.progress(++finished, all, "reading views");
         return {};
@@ -308,7 +282,7 @@ Result<Bundle> wholeBundle(const ViewTable& table, PixelSpool& spool, Job& job) 
     STX_CHECK(forEachView(
         table, {"reading", 0}, job,
         [&](std::size_t index, std::shared_ptr<const ReferenceView> view) -> Result<void> {
-            bundle.views[index] = std::move(*ownView(std::move(view)));
+            bundle.views[index] = std::move(*toChange(std::move(view)));
             bundle.views[index].moveTo(&spool);
             job.progress(++finished, static_cast<std::int64_t>(table.count()), "reading views");
             return {};

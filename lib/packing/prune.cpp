@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/views_over.hpp"
 #include "lib/packing/redundancy.hpp"
 #include "lib/packing/views_one_by_one.hpp"
 #include "lib/selection/coverage.hpp"
@@ -349,40 +350,29 @@ Result<std::int64_t> giveAwayTo(std::int64_t budget, std::vector<PruneView>& vie
 }
 
 /// Views without what another view shows. Nothing else of them changes.
-class PrunedViews : public ViewTable {
+class PrunedViews : public ViewsOver {
   public:
     /// `own`: the table, if this is to keep it; may be null.
     PrunedViews(const ViewTable& table, std::unique_ptr<ViewTable> own, Bundle headers,
                 Pruning pruning)
-        : ViewTable(std::move(headers), table.kinds(),
-                    table.planesKnown() ? Planes::known : Planes::withPixels),
-          table_(&table),
-          own_(std::move(own)),
+        : ViewsOver(table, std::move(own), std::move(headers), table.kinds(), planesOf(table)),
           pruning_(std::move(pruning)) {}
 
-    std::uint64_t bytesHeld() const override { return table_->bytesHeld(); }
     std::uint64_t bytesToMake(std::size_t index) const override {
         constexpr std::uint64_t kCopyAndMasks = 24;  // for each pixel, beside the view
-        return std::max(table_->bytesToMake(index),
+        return std::max(table_.bytesToMake(index),
                         bytesOf(index) + kCopyAndMasks * pixelsOf(index));
     }
-    std::string where() const override { return table_->where(); }
-    int mostAtOnce() const override { return table_->mostAtOnce(); }
 
   protected:
     Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
-        STX_TRY(auto whole, table_->view(index, job));
-        // Nobody else has it, unless it is in memory.
-        auto view = whole.use_count() == 1
-                        ? std::const_pointer_cast<ReferenceView>(std::move(whole))
-                        : std::make_shared<ReferenceView>(*whole);
+        STX_TRY(auto whole, table_.view(index, job));
+        auto view = toChange(std::move(whole));
         keepOnly(pruning_.kept[index], *view);
         return view;
     }
 
   private:
-    const ViewTable* table_;
-    std::unique_ptr<ViewTable> own_;
     Pruning pruning_;
 };
 
