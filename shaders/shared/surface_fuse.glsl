@@ -69,31 +69,39 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
     bool guess = (flags & kExtensionBit) != 0u;
     bool outermost = guess && beyondCentres(self, x, y, q);
     float within = sameWithin(q), close = kLinkedSamples * relativeScale(frameAxis(), q);
-    for (int k = 0; k < int(tile.count); ++k) {
-        if (k == own) continue;
-        uint value = sampleOf(k, i, j);
-        float apart = q - uintBitsToFloat(value);
-        if (value == 0u || !(abs(apart) < within)) {
-            others |= 1u << k;
-            if ((value & kExtensionBit) == 0u && apart > 0.0f && apart < close) closelyBehind |= 1u << k;
-        } else if ((value & kExtensionBit) == 0u) {
-            enough += kWholeVote;
-            guess = false;
-        } else {
+    // First those that show it, then the others until it is decided: in one loop, see voteOf().
+    int count = int(tile.count);
+    for (int n = 0; n < 2 * count; ++n) {
+        bool first = n < count;
+        int k = first ? n : n - count;
+        if (first) {
+            if (k == own) continue;
+            uint value = sampleOf(k, i, j);
+            float apart = q - uintBitsToFloat(value);
+            if (value == 0u || !(abs(apart) < within)) {
+                others |= 1u << k;
+                if ((value & kExtensionBit) == 0u && apart > 0.0f && apart < close) closelyBehind |= 1u << k;
+                continue;
+            }
+            if ((value & kExtensionBit) == 0u) {
+                enough += kWholeVote;
+                guess = false;
+                continue;
+            }
             // The rims of thin parts are extensions in all sources, which show them where they do not see
             // past them. Extensions inside the object are guesses, which support nothing.
-            int vote = voteOf(sourceOf(k), x, y, q, facet);
-            votes += vote;
-            if (vote == kNoVote && silhouette) enough += kWholeVote;
+        } else {
+            if (!(votes < enough)) break;
+            if ((others >> k & 1u) == 0u) continue;
         }
-    }
-    for (int k = 0; k < int(tile.count) && votes < enough; ++k) {
-        if ((others >> k & 1u) == 0u) continue;
         int vote = voteOf(sourceOf(k), x, y, q, facet);
-        if (guess && vote == kNoVote && (closelyBehind >> k & 1u) != 0u && facet.any &&
-            (outermost || sizeIn(sourceOf(k), facet, warp(sourceOf(k), x, y, q)) > kSeesBetter))
-            return true;
         votes += vote;
+        if (vote != kNoVote) continue;
+        if (first)
+            enough += silhouette ? kWholeVote : 0;
+        else if (guess && (closelyBehind >> k & 1u) != 0u && facet.any &&
+                 (outermost || sizeIn(sourceOf(k), facet, warp(sourceOf(k), x, y, q)) > kSeesBetter))
+            return true;
     }
     return votes >= enough;
 }

@@ -194,23 +194,34 @@ bool beyondCentres(int s, float x, float y, float q) {
     return min(min(u, float(size.x) - u), min(v, float(size.y) - v)) < 0.5f;
 }
 
-// The vote of a source that votes on the point (x, y, q) of the frame, which is of this facet. Of a surface
-// that it sees edge on, all is outline, and where that is its pixels tell to a part of one only: it must see
-// past what is so far behind the point, too.
-int voteOnOutline(int s, IN(Facet) facet, float x, float y, float q, int vote) {
-    if (!facet.any) return vote;
-    vec4 h = warp(s, x, y, q);
-    if (!(sizeIn(s, facet, h) < facet.edgeOn)) return vote;
-    bool outline;
+// A source whose vote on a point is of an outline, beside what it sees edge on, where all is outline, and where
+// that is its pixels tell to a part of one only: it must see past what is so far behind the point, too.
+bool seesEdgeOn(int s, IN(Facet) facet, vec4 h) { return facet.any && sizeIn(s, facet, h) < facet.edgeOn; }
+vec4 behindFacet(int s, IN(Facet) facet, vec4 h) {
     float behind = kBehindTexel * texelAt(s, h.z / h.w) * facet.perUnit + facet.off;
-    return min(vote, voteAt(s, h - warpChange(s, facet.into) * behind, outline));
+    return h - warpChange(s, facet.into) * behind;
 }
 
-// The vote of a source on the point (x, y, q) of the frame, which is of this facet.
-int voteOf(int s, float x, float y, float q, IN(Facet) facet) {
+// The vote of a source that votes on the point (x, y, q) of the frame, which is of this facet.
+int voteOnOutline(int s, IN(Facet) facet, float x, float y, float q, int vote) {
+    vec4 h = warp(s, x, y, q);
     bool outline;
-    int vote = voteAt(s, warp(s, x, y, q), outline);
-    return vote == kNoVote || !outline ? vote : voteOnOutline(s, facet, x, y, q, vote);
+    return seesEdgeOn(s, facet, h) ? min(vote, voteAt(s, behindFacet(s, facet, h), outline)) : vote;
+}
+
+// The vote of a source on the point (x, y, q) of the frame, which is of this facet. A loop, since drivers put
+// every call of a function in its place: voteAt() twice, here and wherever this is called, takes one 20 s to compile.
+int voteOf(int s, float x, float y, float q, IN(Facet) facet) {
+    vec4 h = warp(s, x, y, q);
+    int vote = kTwoVotes;
+    bool again = true;
+    for (bool behind = false; again; behind = true) {
+        bool outline;
+        vote = min(vote, voteAt(s, h, outline));
+        again = !behind && vote != kNoVote && outline && seesEdgeOn(s, facet, h);
+        if (again) h = behindFacet(s, facet, h);
+    }
+    return vote;
 }
 
 // The same of a point of which nobody shows a surface.

@@ -65,8 +65,10 @@ Place placeOf(int s, ivec2 corner) {
     if (sources[s].place.x >= 0) return wholePlace(s, corner);
     ivec2 last = sources[s].size.xy - 1;
     ivec2 low = max(corner, ivec2(0)), high = min(corner + 1, last);
-    Place p = findPlace(s, corner, max(low - 1, ivec2(0)), min(high + 1, last));
-    if (p.texel.z < 0) p = findPlace(s, corner, low, high);
+    Place p;
+    p.texel.z = -1;
+    for (int margin = 1; margin >= 0 && p.texel.z < 0; --margin)
+        p = findPlace(s, corner, max(low - margin, ivec2(0)), min(high + margin, last));
     if (p.texel.z >= 0) return p;
     for (int y = low.y; y <= high.y; ++y)
         for (int x = low.x; x <= high.x; ++x)

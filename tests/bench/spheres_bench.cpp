@@ -1,8 +1,8 @@
-// Milliseconds of the median frame of each mode on the processor, frames drawn one after another
-// and not written, and points a second as a share of the yardsticks' (yardstick.hpp), which are
-// timed in turn with them.
+// Milliseconds of the median frame of each mode, on the processor or a GPU, frames drawn one after
+// another, read back and not written, and points a second as a share of the yardsticks'
+// (yardstick.hpp), which are timed in turn with them.
 //
-//     bench_spheres [--json] [--frames N] [BUNDLE CAMERAS [MODE...]]
+//     bench_spheres [--json] [--gpu] [--frames N] [BUNDLE CAMERAS [MODE...]]
 //
 // CAMERAS is a camera file, or orbit:N for N pictures of 512x512 around the object. Modes:
 // normal, best (surface), splat, points; all without one. Without BUNDLE: MPEG's scene spheres-miv.
@@ -44,6 +44,7 @@ struct Options {
     std::vector<std::string> modes;
     int frames = 60;
     bool json = false;
+    Backend backend = Backend::cpu;
 };
 
 Result<std::vector<Camera>> camerasOf(const Options& o, const Bundle& bundle, Job& job) {
@@ -81,7 +82,7 @@ Result<void> measure(const Options& o) {
         settings.mode = mode.mode;
         settings.quality = mode.quality;
         settings.splat = mode.splat;
-        STX_TRY(const auto renderer, makeRenderer(Backend::cpu, bundle, settings, -1, job));
+        STX_TRY(const auto renderer, makeRenderer(o.backend, bundle, settings, -1, job));
         std::vector<double> ours, plain, vectors;
         std::clock_t processor = 0;
         const int warm = std::max(1, o.frames / 10);
@@ -128,6 +129,8 @@ int main(int count, char** values) {
         const std::string word = values[i];
         if (word == "--json")
             o.json = true;
+        else if (word == "--gpu")
+            o.backend = Backend::gpu;
         else if (word == "--frames" && i + 1 < count)
             o.frames = std::max(1, std::atoi(values[++i]));
         else

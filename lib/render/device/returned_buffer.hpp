@@ -47,17 +47,14 @@ struct ReturnedBuffer {
     }
     /// After the last command that writes it.
     void fence() {
-        forget();
         glMemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
         done = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
         glFlush();
     }
+    /// Until it has arrived; does nothing when it has. Wanted before the next picture is drawn,
+    /// too: NVIDIA's driver (580.159) clears buffers out of order while shaders run, so that
+    /// pictures under way at once lose theirs.
     [[nodiscard]] Result<void> wait(const EglContext& context) { return waitFor(done, context); }
-    /// Nobody wants what is under way: the next picture overwrites it, in the commands' order.
-    void forget() {
-        if (done) glDeleteSync(done);
-        done = nullptr;
-    }
 };
 
 }  // namespace stx::gpu

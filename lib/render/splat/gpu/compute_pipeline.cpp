@@ -191,6 +191,7 @@ Result<void> ComputeSplats::draw(SplatFrame& frame, int slot) {
     front_.reserve(padded * 4);
     sums_.reserve(padded * 4 * channels());
     STX_CHECK(context_.check("making the frame's buffers"));
+    for (Slot& s : slots_) STX_CHECK(s.back.wait(context_));
     const std::uint32_t nothing = 0x7f800000u, zero = 0;
     glClearNamedBufferSubData(front_.buffer.get(), GL_R32UI, 0, padded * 4, GL_RED_INTEGER,
                               GL_UNSIGNED_INT, &nothing);

@@ -69,7 +69,7 @@ struct Batch {
 /// Where a batch arrives on its way back.
 struct Returned {
     ReturnedBuffer memory;
-    std::span<const TilePlan> tiles;
+    std::span<const TilePlan> tiles;  ///< that it holds and nobody has taken
 };
 
 /// Everything that lives in the context; destroyed while it is current.
@@ -377,6 +377,7 @@ Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const T
                                      Returned& back) {
     const Batch batch = fillBatch(work, plans);
     const std::int64_t pixels = static_cast<std::int64_t>(plans.size()) * kTilePixels;
+    for (Returned& r : resources_->returned) STX_CHECK(r.memory.wait(*context_));
     STX_CHECK(upload(work, batch, pixels, back));
     bind(work, batch);
     dispatch(work, batch, pixels);
@@ -395,7 +396,7 @@ Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const T
 
 Result<void> GpuSurfaceBackend::collect(const SurfaceFrame& work, Returned& back,
                                         DrawnFrame out) const {
-    if (!back.memory.done) return {};
+    if (back.tiles.empty()) return {};
     STX_CHECK(back.memory.wait(*context_));
     const std::byte* memory = back.memory.memory;
     const std::int64_t pixels = static_cast<std::int64_t>(back.tiles.size()) * kTilePixels;
@@ -416,6 +417,7 @@ Result<void> GpuSurfaceBackend::collect(const SurfaceFrame& work, Returned& back
                 out.origin.at(x0 + x, y) = glm::vec3(origin[from + x]);
         }
     });
+    back.tiles = {};
     return {};
 }
 
@@ -468,10 +470,7 @@ Result<void> GpuSurfaceBackend::finish(DrawnFrame out) {
 void GpuSurfaceBackend::drop() {
     const Begun frame = std::move(begun_.front());
     begun_.pop_front();
-    if (!frame.back) return;
-    // Its memory is written in the order of the commands: the next frame overwrites it.
-    if (auto current = context_->makeCurrent()) frame.back->memory.forget();
-    frame.back->memory.done = nullptr;
+    if (frame.back) frame.back->tiles = {};
 }
 
 }  // namespace

@@ -5,8 +5,11 @@
 namespace stx::gpu {
 
 std::string surfaceHeader(const SurfaceVariant& v, SurfaceProgram program) {
+    // NVIDIA's compiler copies the bodies of loops, and takes twice as long for these shaders,
+    // which are not faster for it; others ignore its pragma.
     return fmt::format(
-        "#version 450 core\n#define S {}\n#define FREE_LEVEL {:.9e}\n#define MOST {}\n"
+        "#version 450 core\n#pragma optionNV(unroll none)\n#define S {}\n#define FREE_LEVEL "
+        "{:.9e}\n#define MOST {}\n"
         "#define EXTEND {}\n#define CORE {}\n#define ORIGIN {}\n",
         v.samplesPerPixel, v.freeLevel, v.mostSources,
         program == SurfaceProgram::extensions ? 1 : 0, program == SurfaceProgram::fuseCore ? 1 : 0,
