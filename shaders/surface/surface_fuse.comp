@@ -1,11 +1,12 @@
 // Surface mode, pass B: what each pixel shows. A thread does one pixel with the code of
 // shared/surface_fuse.glsl, as the processor does in lib/render/surface/cpu/fuse.cpp. Of tiles that are the mean of
-// two answers, CORE = 0 gives what all sources show, and CORE = 1 afterwards what the first do where that is not
-// simple. A loop around both would run into the 65535 rounds that llvmpipe allows all loops of a thread together.
+// two answers, a first run gives what all sources show, and a second, with `core`, what the first do where that is
+// not simple. A loop around both would run into the 65535 rounds that llvmpipe allows all loops of a thread together.
 #include "surface/surface_common.glsl"
 #include "surface/surface_tiles.glsl"
 layout(local_size_x = 16, local_size_y = 16) in;
 layout(std430, binding = 4) readonly buffer SampleBuffer { uint samples[]; };
+layout(location = 0) uniform bool core;
 
 TileEntry tile;
 int sourceOf(int k) { return int(locals[tile.first + uint(k)].x); }
@@ -46,10 +47,10 @@ void main() {
     uint index = first + uint(pixel.y * kTile + pixel.x);
     ivec2 inFrame = ivec2(tile.x, tile.y) + pixel;
     bool wanted = all(greaterThanEqual(inFrame, ivec2(0))) && all(lessThan(inFrame, frame.size.xy));
-#if CORE
-    wanted = wanted && ranges[index].z == kAsksAgain;
-    tile.count = tile.core;
-#endif
+    if (core) {
+        wanted = wanted && ranges[index].z == kAsksAgain;
+        tile.count = tile.core;
+    }
     if (gl_LocalInvocationIndex == 0u) groupCount = 0u;
     barrier();
 
@@ -86,14 +87,12 @@ void main() {
     }
     barrier();
     mine += groupFirst;
-#if CORE
-    float share = 1.0f - kAllShare;
-    if (wanted) ranges[index].zw = uvec2(mine, count);
-#else
     bool again = twice && !simple;
-    float share = again ? kAllShare : 1.0f;
-    ranges[index] = uvec4(mine, count, again ? kAsksAgain : 0u, 0u);
-#endif
+    float share = core ? 1.0f - kAllShare : again ? kAllShare : 1.0f;
+    if (!core)
+        ranges[index] = uvec4(mine, count, again ? kAsksAgain : 0u, 0u);
+    else if (wanted)
+        ranges[index].zw = uvec2(mine, count);
     if (simple && count > 0u) {
         only.at += first;
         only.share *= share;

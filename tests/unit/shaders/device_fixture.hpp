@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <span>
@@ -47,12 +48,14 @@ struct Device {
                                 static_cast<GLsizeiptr>(count * sizeof(T)), out.data());
         return out;
     }
-    void run(const std::string& header, const std::vector<gpu::ShaderStage>& stages,
-             GLuint groups) const {
+    void run(
+        const std::string& header, const std::vector<gpu::ShaderStage>& stages, GLuint groups,
+        const std::function<void()>& setUniforms = [] {}) const {
         auto program = gpu::buildProgram(header, stages);
         ASSERT_TRUE(program) << program.error().text();
         glMemoryBarrier(GL_ALL_BARRIER_BITS);
         glUseProgram(program->get());
+        setUniforms();
         glDispatchCompute(groups, 1, 1);
         auto done = context->check("running a shader");
         EXPECT_TRUE(done) << done.error().text();

@@ -381,9 +381,11 @@ class SurfaceShaders : public SurfaceCode {
         for (uint i = 0; i < kSources; ++i) locals.emplace_back(i, i);
         device->storage(6, locals);
     }
-    void run(gpu::SurfaceProgram program, GLuint groups) const {
+    void run(gpu::SurfaceProgram program, GLuint groups, bool core = false) const {
         device->run(gpu::surfaceHeader({kPerPixel, 4, kFreeLevel}, program),
-                    {gpu::surfaceStage(program)}, groups);
+                    {gpu::surfaceStage(program)}, groups, [&] {
+                        if (core) glUniform1i(gpu::kFuseCore, 1);
+                    });
     }
     std::unique_ptr<test::Device> device;
     gpu::GpuSurfaceScene scene;
@@ -435,7 +437,7 @@ TEST_P(SurfaceShaders, FuseAsTheSharedCodeDoesOnTheProcessor) {
     device->storage(9, std::vector<uint>{0, 1, 1, 0});
     run(gpu::SurfaceProgram::fuse, kPixels / 256);
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-    if (in.core < kSources) run(gpu::SurfaceProgram::fuseCore, kPixels / 256);
+    if (in.core < kSources) run(gpu::SurfaceProgram::fuse, kPixels / 256, true);
     const auto pieces = device->read<Piece>(7, kMost);
     const auto ranges = device->read<glm::uvec4>(8, kPixels);
     std::vector<std::vector<Piece>> expected(kPixels);

@@ -75,7 +75,7 @@ struct Returned {
 /// Everything that lives in the context; destroyed while it is current.
 struct Resources {
     GpuSurfaceScene scene;
-    GlProgram mesh, extensions, fuse, fuseCore, shade, resolve, resolveWithOrigin;
+    GlProgram mesh, extensions, fuse, shade, resolve, resolveWithOrigin;
     GlBuffer uniforms;
     GrowingBuffer sources, slots, meshes, edges, tiles, locals;
     GrowingBuffer samples, pieces, ranges, counts, pieceColours, colour, depth, origin;
@@ -157,9 +157,6 @@ Result<void> GpuSurfaceBackend::prepare(const SurfaceScene& scene, const surface
     STX_TRY(r.mesh, build(SurfaceProgram::mesh));
     STX_TRY(r.extensions, build(SurfaceProgram::extensions));
     STX_TRY(r.fuse, build(SurfaceProgram::fuse));
-    if (answers_ == 2) {
-        STX_TRY(r.fuseCore, build(SurfaceProgram::fuseCore));
-    }
     STX_TRY(r.shade, build(SurfaceProgram::shade));
     STX_TRY(r.resolve, build(SurfaceProgram::resolve));
     STX_TRY(r.resolveWithOrigin, build(SurfaceProgram::resolveWithOrigin));
@@ -355,12 +352,10 @@ void GpuSurfaceBackend::dispatch(const SurfaceFrame& work, const Batch& batch,
     };
     rasterise(r.mesh, r.meshes, batch.meshes.size());
     rasterise(r.extensions, r.edges, batch.edges.size());
-    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     glUseProgram(r.fuse.get());
-    glDispatchCompute(static_cast<GLuint>(pixels / 256), 1, 1);
-    if (answers_ == 2) {
+    for (int core = 0; core < answers_; ++core) {
         glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-        glUseProgram(r.fuseCore.get());
+        glUniform1i(kFuseCore, core);
         glDispatchCompute(static_cast<GLuint>(pixels / 256), 1, 1);
     }
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_COMMAND_BARRIER_BIT);

@@ -10,9 +10,9 @@ std::string surfaceHeader(const SurfaceVariant& v, SurfaceProgram program) {
     return fmt::format(
         "#version 450 core\n#pragma optionNV(unroll none)\n#define S {}\n#define FREE_LEVEL "
         "{:.9e}\n#define MOST {}\n"
-        "#define EXTEND {}\n#define CORE {}\n#define ORIGIN {}\n",
+        "#define EXTEND {}\n#define ORIGIN {}\n",
         v.samplesPerPixel, v.freeLevel, v.mostSources,
-        program == SurfaceProgram::extensions ? 1 : 0, program == SurfaceProgram::fuseCore ? 1 : 0,
+        program == SurfaceProgram::extensions ? 1 : 0,
         program == SurfaceProgram::resolveWithOrigin ? 1 : 0);
 }
 
@@ -23,7 +23,6 @@ ShaderStage surfaceStage(SurfaceProgram program) {
         case SurfaceProgram::extensions:
             return {GL_COMPUTE_SHADER, "surface_raster.comp", {surface_raster_comp}};
         case SurfaceProgram::fuse:
-        case SurfaceProgram::fuseCore:
             return {GL_COMPUTE_SHADER, "surface_fuse.comp", {surface_fuse_comp}};
         case SurfaceProgram::shade:
             return {GL_COMPUTE_SHADER, "surface_shade.comp", {surface_shade_comp}};
@@ -39,8 +38,7 @@ std::vector<ShaderText> allSurfaceShaders() {
     for (const SurfaceVariant v : {SurfaceVariant{3, 4}, SurfaceVariant{4, 4}})
         for (const auto program :
              {SurfaceProgram::mesh, SurfaceProgram::extensions, SurfaceProgram::fuse,
-              SurfaceProgram::fuseCore, SurfaceProgram::shade, SurfaceProgram::resolve,
-              SurfaceProgram::resolveWithOrigin}) {
+              SurfaceProgram::shade, SurfaceProgram::resolve, SurfaceProgram::resolveWithOrigin}) {
             const ShaderStage stage = surfaceStage(program);
             out.push_back(shaderText(fmt::format("{} program {} S {}", stage.name,
                                                  static_cast<int>(program), v.samplesPerPixel),

@@ -15,8 +15,10 @@ struct SurfaceVariant {
     float freeLevel = surface::kFreeLevel;
 };
 
-/// `fuseCore`: what the first sources of a tile show, after `fuse` (SurfaceFrame::tileCore).
-enum class SurfaceProgram { mesh, extensions, fuse, fuseCore, shade, resolve, resolveWithOrigin };
+/// `fuse` runs again with 1 at the location kFuseCore, for what the first sources of a tile show
+/// (SurfaceFrame::tileCore).
+enum class SurfaceProgram { mesh, extensions, fuse, shade, resolve, resolveWithOrigin };
+constexpr int kFuseCore = 0;
 
 [[nodiscard]] std::string surfaceHeader(const SurfaceVariant& variant, SurfaceProgram program);
 [[nodiscard]] ShaderStage surfaceStage(SurfaceProgram program);
