@@ -39,6 +39,23 @@ bool seeTheSameSide(const Camera& camera, const GridOfPoints::Point& p, const gl
     return side(own) * side(other) > 0;
 }
 
+/// How far a surface may be from what is read between four pixels of it: a quarter of the change of
+/// slope there, by the second differences at the four. (x, y) as of sampleDepth().
+double bentBetween(const Image<float>& depth, double x, double y) {
+    const int left = static_cast<int>(std::floor(x - 0.5));
+    const int top = static_cast<int>(std::floor(y - 0.5));
+    const auto bend = [&](int px, int py, int dx, int dy) {
+        if (!depth.contains(px - dx, py - dy) || !depth.contains(px + dx, py + dy)) return 0.0;
+        const float before = depth.at(px - dx, py - dy), after = depth.at(px + dx, py + dy);
+        if (!hasPoint(before) || !hasPoint(after)) return 0.0;
+        return std::abs(static_cast<double>(before) - 2.0 * depth.at(px, py) + after);
+    };
+    double bends = 0;
+    for (int i = 0; i < 4; ++i)
+        bends += bend(left + i % 2, top + i / 2, 1, 0) + bend(left + i % 2, top + i / 2, 0, 1);
+    return bends / 8;  // each change of slope is in two pixels of two rows
+}
+
 }  // namespace
 
 GridOfPoints gridOfPoints(const Image<float>& depth, int perAxis) {
@@ -82,7 +99,7 @@ CommonPoints commonPoints(const GridOfPoints& from, const Camera& own, const Dep
         const auto there = sampleDepth(*to.depth, at.x, at.y);
         if (!there || !(std::abs(at.z - there->distance) < tolerance * at.z)) continue;
         if (!seeTheSameSide(own, p, ownEye, otherEye)) continue;
-        out.points.push_back({p.own, at.z, there->distance});
+        out.points.push_back({p.own, at.z, there->distance, bentBetween(*to.depth, at.x, at.y)});
     }
     return out;
 }

@@ -48,6 +48,7 @@ struct CommonPoints {
         double own;    ///< its distance from the view it is of
         double at;     ///< from the other one
         double shown;  ///< what the other one shows there
+        double bent;   ///< by how much that may be off, where its surface bends between pixels
     };
     int asked = 0;  ///< pixels of the grid that have a point
     std::vector<CommonPoint> points;
