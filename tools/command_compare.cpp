@@ -54,9 +54,16 @@ Result<Scores> comparePair(const std::string& a, const std::string& b, const Com
                            Program& program) {
     STX_TRY(const auto first, openPicture(a, program.job));
     // Both, what of the second its decoder holds, and their luma and colour differences.
-    STX_CHECK(checkPeak(first.isLinear() ? peak::kComparedLinear : peak::kCompared,
-                        first.coded.count(), 0, 0, program.job.limits));
+    const bool wide = first.isLinear() || !first.fine.empty();
+    STX_CHECK(checkPeak(wide ? peak::kComparedLinear : peak::kCompared, first.coded.count(), 0, 0,
+                        program.job.limits));
     STX_TRY(const auto second, openPicture(b, program.job));
+    for (const auto& [file, picture] : {std::pair{&a, &first}, {&b, &second}})
+        if (picture->pictures > 1)
+            return fail(ErrorCode::unsupported,
+                        "'{}' holds {} pictures, and compare looks at one; 'stx extract {} -o "
+                        "FOLDER' makes files of a bundle's",
+                        *file, picture->pictures, *file);
     CompareSettings settings;
     settings.mask = mask;
     STX_TRY(settings.background, parseColour(o.background, "--background"));
@@ -64,17 +71,21 @@ Result<Scores> comparePair(const std::string& a, const std::string& b, const Com
     STX_TRY(auto result, within(fmt::format("'{}' and '{}'", a, b),
                                 compare(first, second, settings, program.job)));
     scores.plain = result;
-    const bool linear = first.isLinear() && second.isLinear();
-    if (linear)
-        scores.immersive.add(first.linear, second.linear, settings);
+    if (result.identical() && !first.others.empty())
+        program.job.note(fmt::format("only colours are compared; '{}' holds {}, too", a,
+                                     fmt::join(first.others, ", ")));
+    const PicturePair floats(first, second);
+    const bool asFloats = floats.first();
+    if (asFloats)
+        scores.immersive.add(*floats.first(), *floats.second(), settings);
     else
         scores.immersive.add(first.coded, second.coded, settings);
-    if (steadiness && linear) steadiness->add(first.linear, second.linear, settings);
-    if (steadiness && !linear) steadiness->add(first.coded, second.coded, settings);
+    if (steadiness && asFloats) steadiness->add(*floats.first(), *floats.second(), settings);
+    if (steadiness && !asFloats) steadiness->add(first.coded, second.coded, settings);
     if (!o.errorPicture.empty()) {
         STX_TRY(const auto picture,
-                linear ? errorPicture(first.linear, second.linear, settings, o.gain)
-                       : errorPicture(first.coded, second.coded, settings, o.gain));
+                asFloats ? errorPicture(*floats.first(), *floats.second(), settings, o.gain)
+                         : errorPicture(first.coded, second.coded, settings, o.gain));
         STX_TRY(const auto png,
                 encodePng(picture.width(), picture.height(), 4, 8, picture.data(), true));
         STX_CHECK(writeFile(o.errorPicture, png, program.outputOptions()));
@@ -278,7 +289,7 @@ void addCompare(CommandLine& line, Program& program) {
     Command c =
         line.add("compare",
                  "PSNR, IV-PSNR, SSIM and the worst pixel of two images, sequences or folders; "
-                 "exit code 7 when they differ\n\n"
+                 "exit code 7 when they differ; by their colours, of 16 bits to their last\n\n"
                  "  stx compare novel.png truth.png --error-picture error.png\n"
                  "  stx compare a_%04d.png b_%04d.png --format json --min-psnr 40\n"
                  "  stx compare drawn/ truth/ --error-picture errors/   all by their names");

@@ -36,6 +36,8 @@ Result<DecodedImage> decodeExr(ByteSpan bytes, std::string_view name, const Limi
         if (std::find(known.begin(), known.end(), channel.name) == known.end())
             image.channelNames.push_back(channel.name);
     }
+    const auto isPicture = [](const ExrPart& p) { return p.channel("R") || p.channel("Y"); };
+    image.pictures = std::max<int>(1, std::ranges::count_if(reader.parts(), isPicture));
     const auto pixels = static_cast<std::uint64_t>(part.width) * part.height;
     STX_CHECK(
         within(reader.where(),

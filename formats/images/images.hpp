@@ -42,6 +42,9 @@ struct DecodedImage {
     /// the size of that; other formats: 0, 0 and the image's own size.
     int originX = 0, originY = 0;
     int displayWidth = 0, displayHeight = 0;
+    /// That the file holds (OpenEXR: parts with colours, views of a bundle), of which this is the
+    /// first.
+    int pictures = 1;
     [[nodiscard]] int bits() const {
         return values.index() == 0 ? 8 : values.index() == 1 ? 16 : 32;
     }

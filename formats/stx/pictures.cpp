@@ -103,7 +103,7 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
         STX_TRY(picture.coded, within(inQuotes(path.string()), heifPicture(std::move(bytes), job)));
         return picture;
     }
-    if (probeImage(bytes)) {
+    if (const auto info = probeImage(bytes); info && !(info->format == "png" && info->bits > 8)) {
         STX_TRY(picture.coded, decodeRgba8(bytes, path.string(), job.limits));
         return picture;
     }
@@ -111,10 +111,16 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
     const auto pixels = static_cast<std::uint64_t>(decoded.width) * decoded.height;
     const std::uint64_t bytesEach =
         static_cast<std::uint64_t>(decoded.channels) * decoded.bits() / 8;
-    STX_CHECK(within(
-        inQuotes(path.string()),
-        job.limits.checkAllocation(pixels, bytesEach + (decoded.linear ? 20 : 4), "the picture")));
-    if (decoded.linear) picture.linear = rgbaFloatFrom(decoded);
+    RgbaFloatImage& floats = decoded.linear ? picture.linear : picture.fine;
+    const bool wanted = decoded.bits() > 8;
+    STX_CHECK(
+        within(inQuotes(path.string()),
+               job.limits.checkAllocation(pixels, bytesEach + (wanted ? 20 : 4), "the picture")));
+    picture.pictures = decoded.pictures;
+    for (const std::string& name : decoded.channelNames)
+        if (name != "R" && name != "G" && name != "B" && name != "A" && name != "Y")
+            picture.others.push_back(name);
+    if (wanted) floats = rgbaFloatFrom(decoded);
     picture.coded = rgba8From(decoded);
     const bool isPart =
         decoded.displayWidth > 0 && decoded.displayHeight > 0 &&
@@ -127,14 +133,30 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
                                               static_cast<std::uint64_t>(decoded.displayHeight),
                                           40, "the picture")));
     const bool alpha = std::ranges::find(decoded.channelNames, "A") != decoded.channelNames.end();
-    if (decoded.linear)
-        picture.linear = wholeOf(picture.linear, decoded, glm::vec4(0, 0, 0, alpha ? 0 : 1));
+    if (wanted) floats = wholeOf(floats, decoded, glm::vec4(0, 0, 0, alpha ? 0 : 1));
     picture.coded = wholeOf(picture.coded, decoded, glm::u8vec4(0, 0, 0, alpha ? 0 : 255));
     return picture;
 }
 
+PicturePair::PicturePair(const Picture& a, const Picture& b) {
+    if (a.isLinear() && b.isLinear()) {
+        first_ = &a.linear;
+        second_ = &b.linear;
+    } else if (!a.isLinear() && !b.isLinear() && !(a.fine.empty() && b.fine.empty())) {
+        const auto floats = [&](const Picture& picture) {
+            if (!picture.fine.empty()) return &picture.fine;
+            spread_ = RgbaFloatImage(picture.coded.width(), picture.coded.height());
+            for (std::size_t i = 0; i < spread_.count(); ++i)
+                spread_.data()[i] = glm::vec4(picture.coded.data()[i]) / 255.0f;
+            return &std::as_const(spread_);
+        };
+        first_ = floats(a);
+        second_ = floats(b);
+    }
+}
+
 Picture pictureOf(const Frame& frame, const std::optional<glm::vec3>& background) {
-    return {rgba8From(frame, background), {}};
+    return {rgba8From(frame, background)};
 }
 
 Result<void> save(const Frame& frame, const std::filesystem::path& target,
@@ -152,8 +174,12 @@ Result<Comparison> compare(const Picture& a, const Picture& b, const CompareSett
                            Job& job) {
     if (a.isLinear() != b.isLinear())
         job.note("one picture is linear float, the other 8-bit: both are compared as 8-bit sRGB");
-    if (a.isLinear() && b.isLinear()) return compare(a.linear, b.linear, settings);
-    return compare(a.coded, b.coded, settings);
+    const PicturePair floats(a, b);
+    if (!floats.first()) return compare(a.coded, b.coded, settings);
+    STX_TRY(auto found, compare(*floats.first(), *floats.second(), settings));
+    // In codes of 16 bits; a hundredth of one is rounding.
+    if (!a.isLinear()) found.worst.difference = std::round(6553500 * found.worst.difference) / 100;
+    return found;
 }
 
 }  // namespace stx

@@ -234,10 +234,28 @@ struct OrbitSettings {
 
 /// A picture as files hold it, straight alpha.
 struct Picture {
-    Rgba8Image coded;       ///< 8-bit sRGB, always
-    RgbaFloatImage linear;  ///< linear light, of files of floats (OpenEXR, HDR); else empty
+    Rgba8Image coded;         ///< 8-bit sRGB, always
+    RgbaFloatImage linear{};  ///< linear light, of files of floats (OpenEXR, HDR); else empty
+    RgbaFloatImage fine{};    ///< 0..1, coded as the file is, of integers of 16 bits; else empty
+    int pictures = 1;         ///< that the file holds, of which this is the first (OpenEXR)
+    /// Channels of the file that are no colours of this, as "Z".
+    std::vector<std::string> others{};
 
     [[nodiscard]] bool isLinear() const { return !linear.empty(); }
+};
+
+/// Two pictures as they are compared: as floats when both are linear, or one is of 16 bits and none
+/// is linear (`fine`, the other one's 8 bits spread to 0..1); else by their coded values, and both
+/// are null. They must outlive this.
+class PicturePair {
+  public:
+    PicturePair(const Picture& a, const Picture& b);
+    [[nodiscard]] const RgbaFloatImage* first() const { return first_; }
+    [[nodiscard]] const RgbaFloatImage* second() const { return second_; }
+
+  private:
+    const RgbaFloatImage *first_ = nullptr, *second_ = nullptr;
+    RgbaFloatImage spread_;
 };
 
 /// Opens a picture of any format that the codecs know (PNG, JPEG, TIFF, OpenEXR, ...), and of HEIC
@@ -264,8 +282,9 @@ struct PictureOptions {
 [[nodiscard]] Result<void> save(const Frame& frame, const std::filesystem::path& target,
                                 const PictureOptions& options, Job& job);
 
-/// PSNR, SSIM and the worst pixel of two pictures of one size: as floats when both are linear, else
-/// as 8-bit sRGB, with a note when only one is linear. Pictures in memory: compare() of two images.
+/// PSNR, SSIM and the worst pixel of two pictures of one size, as PicturePair says, with a note when
+/// only one is linear; of 16 bits the worst pixel is in their codes. Pictures in memory: compare()
+/// of two images.
 /// Errors: invalidInput when sizes disagree or the mask leaves nothing.
 [[nodiscard]] Result<Comparison> compare(const Picture& a, const Picture& b,
                                          const CompareSettings& settings, Job& job);

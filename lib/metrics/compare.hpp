@@ -25,7 +25,7 @@ struct CompareSettings {
 /// The pixel with the largest difference in one channel (the first in reading order of equals).
 struct WorstPixel {
     int x = 0, y = 0;
-    double difference = 0;  ///< in the pictures' own values: 0..255 for 8 bits, else scene units
+    double difference = 0;  ///< in the pictures' own values: 0..255 for 8 bits, else as floats are
 };
 
 /// What compare() found.
