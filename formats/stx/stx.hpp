@@ -282,10 +282,9 @@ struct PictureOptions {
 [[nodiscard]] Result<void> save(const Frame& frame, const std::filesystem::path& target,
                                 const PictureOptions& options, Job& job);
 
-/// PSNR, SSIM and the worst pixel of two pictures of one size, as PicturePair says, with a note when
-/// only one is linear; of 16 bits the worst pixel is in their codes. Pictures in memory: compare()
-/// of two images.
-/// Errors: invalidInput when sizes disagree or the mask leaves nothing.
+/// PSNR, SSIM and the worst pixel of two pictures of one size, as PicturePair says, with a note
+/// when only one is linear; of 16 bits the worst pixel is in their codes. Pictures in memory:
+/// compare() of two images. Errors: invalidInput when sizes disagree or the mask leaves nothing.
 [[nodiscard]] Result<Comparison> compare(const Picture& a, const Picture& b,
                                          const CompareSettings& settings, Job& job);
 
