@@ -94,10 +94,17 @@ Result<StoredDepth> storedDepth(const Photo& photo, const PhotoDepth& depth, Job
     return StoredDepth{std::move(decoded.values), decoded.bits};
 }
 
-/// What the integers of a picture beside a photo are. Errors (usage): nobody says.
+/// What the integers of a picture beside a photo are. Errors (usage): nobody says, or an option
+/// gives another meaning to floats, which are distances.
 Result<void> readBesideCode(const path& file, const ImageSetOptions& options, int bits,
                             PhotoDepth& depth) {
-    if (bits == 32) return {};
+    if (bits == 32) {
+        if (options.depthMin > 0 || options.depthUnit > 0)
+            return failAt(inQuotes(file.filename().string()), ErrorCode::usage,
+                          "the depth is floats, which are distances; {} is of grey pictures",
+                          options.depthMin > 0 ? "--depth-range" : "--depth-unit");
+        return {};
+    }
     if (options.depthUnit > 0) {
         depth.unit = options.depthUnit;
         return {};

@@ -1,4 +1,4 @@
-// Depth in a grey picture beside a photo: what its codes are.
+// Depth in a grey picture beside a photo: what its codes are, and options that do not go together.
 
 #include <algorithm>
 
@@ -68,4 +68,27 @@ TEST(PhotoDepth, OneCodeIsSomewhereInTheRange) {
     ASSERT_TRUE(read) << read.error().text();
     EXPECT_GT(read->views[0].depth.at(5, 5), 2);
     EXPECT_LT(read->views[0].depth.at(5, 5), 10);
+}
+
+TEST(PhotoDepth, OptionsThatDoNotGoTogetherAreRefused) {
+    GreyBeside photo(16);
+    photo.options.depthUnit = 0.001;
+    expectError(photo.read(), {"--depth-near", "--depth-unit"});
+    photo.options.photo.nearIs = NearIs::unknown;
+    EXPECT_TRUE(photo.read());
+    photo.options.depthMin = 1;
+    photo.options.depthMax = 2;
+    expectError(photo.read(), {"--depth-range", "--depth-unit"});
+    EXPECT_EQ(photo.read().error().code, ErrorCode::usage);
+    // Floats are distances already.
+    std::filesystem::remove(photo.folder / "a_depth.png");
+    writeExr(photo.folder / "a_depth.exr", {{"Z", plane(96, 64, [](int, int) { return 3; })}});
+    photo.options.depthUnit = 0;
+    expectError(photo.read(), {"a_depth.exr", "floats", "--depth-range"});
+    EXPECT_EQ(photo.read().error().code, ErrorCode::usage);
+    photo.options.depthMin = photo.options.depthMax = 0;
+    photo.options.depthUnit = 0.001;
+    expectError(photo.read(), {"a_depth.exr", "floats", "--depth-unit"});
+    photo.options.depthUnit = 0;
+    EXPECT_TRUE(photo.read());
 }
