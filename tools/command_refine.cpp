@@ -129,7 +129,11 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
         STX_CHECK(saveSequence(*frames, o.output, save, program.job));
     }
     const RefineReport& report = refining.report();
-    if (before) program.job.note("views that were refined before are left as they are");
+    // What an import has just done is in the report.
+    if (before && !refining.imported())
+        program.job.note(report.changed()
+                             ? "views were refined before: steps of then are not done again"
+                             : "views that were refined before are left as they are");
     const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format(

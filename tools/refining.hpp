@@ -77,6 +77,8 @@ class Refining {
     Result<void> refine(Bundle& bundle, PixelSpool* spool, Job& job);
     /// Errors (usage): a step that only an import can do, where the input is not an image set.
     [[nodiscard]] Result<void> check() const;
+    /// Whether what was read is an image set, whose import has done its steps.
+    [[nodiscard]] bool imported() const { return imported_; }
     /// What is left to do of what was read last.
     [[nodiscard]] RefineSettings left() const {
         return imported_ ? settings_.afterImport() : settings_;

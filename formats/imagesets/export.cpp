@@ -36,10 +36,13 @@ glm::dvec3 mivRotation(const glm::dquat& orientation) {
     return glm::dvec3(a, -b, -c) * kDegree;
 }
 
+/// The farthest distance that MIV takes for infinite, and so do all above it: code 0 is there.
+constexpr double kMivEndless = 1000;
+
 /// MIV's range of a view, such that code 1 is the far plane and 0 stays free for "none".
 struct MivRange {
     double nearest = 1, farthest = 2;
-    [[nodiscard]] bool endless() const { return farthest >= 1000; }
+    [[nodiscard]] bool endless() const { return farthest >= kMivEndless; }
     [[nodiscard]] double code(double z) const {
         const double s =
             endless() ? nearest / z : (1 / z - 1 / farthest) / (1 / nearest - 1 / farthest);
@@ -58,8 +61,9 @@ Result<MivRange> mivRange(const ReferenceView& view) {
                     view.name, view.nearPlane);
     const double step = 1.0 / 65535;
     const double inverse = (1 / view.farPlane - step / view.nearPlane) / (1 - step);
-    MivRange range{view.nearPlane, inverse > 1e-3 ? 1 / inverse : 1000};
-    return range;
+    if (inverse > 0) return MivRange{view.nearPlane, 1 / inverse};
+    // No code is left for the far plane: those of an endless range come nearest to it.
+    return MivRange{view.nearPlane, std::max(view.farPlane, kMivEndless)};
 }
 
 Result<OutputJson> mivCamera(const ReferenceView& view, const std::string& name,

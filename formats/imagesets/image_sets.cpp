@@ -75,6 +75,12 @@ Result<void> checkOptions(const ImageSetOptions& o) {
                     "the depth range is {:g} to {:g}; the least must be above 0 and below the "
                     "greatest",
                     o.depthMin, o.depthMax);
+    if (o.depthUnit > 0 && o.depthMax > 0)
+        return fail(ErrorCode::usage,
+                    "--depth-range and --depth-unit both say what depth is; give one of them");
+    if (o.depthUnit > 0 && o.photo.nearIs != NearIs::unknown)
+        return fail(ErrorCode::usage,
+                    "--depth-near does not go with --depth-unit, whose steps are distances");
     return {};
 }
 

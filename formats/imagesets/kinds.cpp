@@ -157,6 +157,40 @@ Result<void> findPictures(const path& folder, const std::string& texture, const 
     return {};
 }
 
+bool numbersInOrder(std::string_view a, std::string_view b) {
+    const auto digit = [](std::string_view text, std::size_t at) {
+        return at < text.size() && text[at] >= '0' && text[at] <= '9';
+    };
+    const auto numberEnd = [&](std::string_view text, std::size_t at) {
+        while (digit(text, at)) ++at;
+        return at;
+    };
+    const auto significant = [](std::string_view text, std::size_t at, std::size_t end) {
+        while (at < end && text[at] == '0') ++at;
+        return text.substr(at, end - at);
+    };
+    std::size_t i = 0, j = 0;
+    bool fraction = false;
+    while (i < a.size() && j < b.size()) {
+        if (!digit(a, i) || !digit(b, j) || fraction) {
+            if (a[i] != b[j])
+                return static_cast<unsigned char>(a[i]) < static_cast<unsigned char>(b[j]);
+            fraction = digit(a, i) ? fraction : a[i] == '.' && i > 0 && digit(a, i - 1);
+            ++i;
+            ++j;
+            continue;
+        }
+        const std::size_t iEnd = numberEnd(a, i), jEnd = numberEnd(b, j);
+        const auto x = significant(a, i, iEnd), y = significant(b, j, jEnd);
+        if (x.size() != y.size()) return x.size() < y.size();
+        if (x != y) return x < y;
+        i = iEnd;
+        j = jEnd;
+    }
+    if (i < a.size() || j < b.size()) return j < b.size();
+    return a < b;  // they differ in leading zeros at most
+}
+
 std::vector<std::string> filesIn(const path& folder) {
     std::vector<std::string> names;
     std::error_code ec;
@@ -165,7 +199,7 @@ std::vector<std::string> filesIn(const path& folder) {
         std::error_code ignored;
         if (it->is_regular_file(ignored)) names.push_back(it->path().filename().string());
     }
-    std::sort(names.begin(), names.end());
+    std::sort(names.begin(), names.end(), numbersInOrder);
     return names;
 }
 

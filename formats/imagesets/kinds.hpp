@@ -97,7 +97,10 @@ enum class JsonKind { transforms, miv, cameras, cameraPath, none };
 [[nodiscard]] Result<void> findPictures(const path& folder, const std::string& texture,
                                         const std::string& depth, const std::string& where,
                                         const Limits& limits, SetView& view);
-/// Names of the regular files in a folder, sorted.
+/// Whether `a` comes before `b` where numbers in names count as numbers: 9.png, 10.png, 010.png.
+/// The digits of a fraction (1305031102.25.png) count as such. A total order.
+[[nodiscard]] bool numbersInOrder(std::string_view a, std::string_view b);
+/// Names of the regular files in a folder, sorted by numbersInOrder().
 [[nodiscard]] std::vector<std::string> filesIn(const path& folder);
 /// Errors when there are more views than limits.maxViews.
 [[nodiscard]] Result<void> checkViewCount(std::uint64_t count, const Limits& limits,

@@ -125,11 +125,13 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
                       k[1]);
     SetDescription set;
     std::optional<glm::ivec2> size;
+    std::vector<bool> posed(colours.size(), false);
     for (const LoggedPose& pose : poses) {
         if (pose.frame >= colours.size())
             return failAt(logWhere + ": " + pose.where, ErrorCode::invalidInput,
                           "a pose of frame {}, but there are {} pictures", pose.frame,
                           colours.size());
+        posed[pose.frame] = true;
         SetView view;
         view.name = path(colours[pose.frame]).stem().string();
         STX_CHECK(findPictures(folder, colourFolder + "/" + colours[pose.frame],
@@ -153,6 +155,10 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
         view.sensor = true;
         set.views.push_back(std::move(view));
     }
+    if (const auto without = std::ranges::count(posed, false); without > 0)
+        job.note(fmt::format("{} of {} pictures {} no pose in '{}' and {} left out", without,
+                             posed.size(), without == 1 ? "has" : "have", log,
+                             without == 1 ? "is" : "are"));
     return set;
 }
 

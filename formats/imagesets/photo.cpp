@@ -64,10 +64,16 @@ struct PhotoDepth {
 Result<StoredDepth> readBeside(const PictureSource& source, Job& job) {
     STX_TRY(const auto bytes, readFile(source.path, job.limits));
     const auto info = probeImage(bytes);
-    if (!info || info->format != "jpeg" || info->channels != 3) return readDepth(source, job);
+    if (!info || info->format != "jpeg") return readDepth(source, job);
+    if (info->channels != 3) {
+        STX_TRY(auto grey, readDepth(source, job));
+        grey.lossy = true;
+        return grey;
+    }
     STX_TRY(const auto picture, decodeRgba8(bytes, source.name, job.limits));
     StoredDepth out;
     out.bits = 8;
+    out.lossy = true;
     out.values = Image<float>(picture.width(), picture.height());
     constexpr double kMostColour = 8;  // levels, in the mean; a photograph has more
     double colour = 0;
@@ -88,10 +94,17 @@ Result<StoredDepth> storedDepth(const Photo& photo, const PhotoDepth& depth, Job
     return StoredDepth{std::move(decoded.values), decoded.bits};
 }
 
-/// What the integers of a picture beside a photo are. Errors (usage): nobody says.
+/// What the integers of a picture beside a photo are. Errors (usage): nobody says, or an option
+/// gives another meaning to floats, which are distances.
 Result<void> readBesideCode(const path& file, const ImageSetOptions& options, int bits,
                             PhotoDepth& depth) {
-    if (bits == 32) return {};
+    if (bits == 32) {
+        if (options.depthMin > 0 || options.depthUnit > 0)
+            return failAt(inQuotes(file.filename().string()), ErrorCode::usage,
+                          "the depth is floats, which are distances; {} is of grey pictures",
+                          options.depthMin > 0 ? "--depth-range" : "--depth-unit");
+        return {};
+    }
     if (options.depthUnit > 0) {
         depth.unit = options.depthUnit;
         return {};
@@ -125,18 +138,25 @@ Result<PhotoDepth> besideDepth(const path& file, const ImageSetOptions& options,
     return depth;
 }
 
-/// Gives a range to a code without one, or the one that is asked for.
+/// Gives a range to a code without one, or the one that is asked for: of the ends of a code with a
+/// scale, as its file has them, else of the values that the picture has.
 Result<void> setRange(const Photo& photo, const ImageSetOptions& options, PhotoDepth& depth,
                       Job& job) {
-    if (options.depthMin > 0) {
-        depth.code.setRange(options.depthMin, options.depthMax);
+    const bool given = options.depthMin > 0;
+    if (depth.code.scaled()) {
+        if (given) depth.code.setRange(options.depthMin, options.depthMax);
         return {};
     }
-    if (depth.code.scaled() || depth.unit > 0) return {};
+    if (depth.unit > 0) return {};
     STX_TRY(const auto stored, storedDepth(photo, depth, job));
     if (stored.bits == 32) return {};
-    depth.code.assumeRange(stored.values, (1 << stored.bits) - 1);
-    depth.assumed = true;
+    const int largest = (1 << stored.bits) - 1;
+    if (given)
+        depth.code.setRange(options.depthMin, options.depthMax, stored.values, largest,
+                            stored.lossy);
+    else
+        depth.code.assumeRange(stored.values, largest, stored.lossy);
+    depth.assumed = !given;
     return {};
 }
 

@@ -18,6 +18,7 @@ struct StoredColour {
 struct StoredDepth {
     Image<float> values;
     int bits = 32;
+    bool lossy = false;  ///< of a JPEG, beside a photo
 };
 [[nodiscard]] Result<StoredDepth> readDepth(const PictureSource& source, Job& job);
 

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <queue>
+#include <tuple>
 
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
@@ -97,18 +99,52 @@ struct Frame {
     TimedPose pose;
 };
 
-/// The depth image nearest in time to each colour image, each used once at most.
+/// Colour and depth images of the same moment, each used once at most: the nearest pair first, as
+/// TUM's associate.py pairs them. Two that are nearest are neighbours among those left in the order
+/// of time.
 std::vector<Frame> associate(const std::vector<TimedName>& colours,
                              const std::vector<TimedName>& depths) {
-    std::vector<Frame> frames;
-    std::size_t at = 0;
-    for (const TimedName& colour : colours) {
-        while (at + 1 < depths.size() && std::abs(depths[at + 1].time - colour.time) <=
-                                             std::abs(depths[at].time - colour.time))
-            ++at;
-        if (at >= depths.size() || std::abs(depths[at].time - colour.time) > kSameTime) continue;
-        frames.push_back({colour.time, colour.name, depths[at].name, {}});
+    struct Shot {
+        double time;
+        const TimedName* image;
+        bool isDepth;
+        std::size_t before, after;  // neighbours among those left, and an end on each side
+        const TimedName* depth;     // of a colour image that has one
+        bool left = true;
+    };
+    std::vector<Shot> shots(1);
+    for (const TimedName& c : colours) shots.push_back({c.time, &c, false, 0, 0, nullptr});
+    for (const TimedName& d : depths) shots.push_back({d.time, &d, true, 0, 0, nullptr});
+    std::stable_sort(shots.begin() + 1, shots.end(),
+                     [](auto& a, auto& b) { return a.time < b.time; });
+    const std::size_t end = shots.size();
+    shots.push_back({});
+    for (std::size_t i = 1; i <= end; ++i) {
+        shots[i].before = i - 1;
+        shots[i - 1].after = i;
     }
+    using Pair = std::tuple<double, std::size_t, std::size_t>;  // seconds apart; shots
+    std::priority_queue<Pair, std::vector<Pair>, std::greater<>> pairs;
+    const auto add = [&](std::size_t a, std::size_t b) {
+        if (a == 0 || b == end || shots[a].isDepth == shots[b].isDepth) return;
+        const double apart = shots[b].time - shots[a].time;
+        if (apart <= kSameTime) pairs.emplace(apart, a, b);
+    };
+    for (std::size_t i = 1; i + 1 < end; ++i) add(i, i + 1);
+    while (!pairs.empty()) {
+        const auto [apart, a, b] = pairs.top();
+        pairs.pop();
+        if (!shots[a].left || !shots[b].left) continue;
+        shots[a].left = shots[b].left = false;
+        shots[shots[a].isDepth ? b : a].depth = shots[shots[a].isDepth ? a : b].image;
+        const std::size_t before = shots[a].before, after = shots[b].after;
+        shots[before].after = after;
+        shots[after].before = before;
+        add(before, after);
+    }
+    std::vector<Frame> frames;
+    for (const Shot& shot : shots)
+        if (shot.depth) frames.push_back({shot.time, shot.image->name, shot.depth->name, {}});
     return frames;
 }
 

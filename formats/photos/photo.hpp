@@ -30,11 +30,15 @@ struct PhotoImage {
     int width = 0, height = 0;  ///< as it is decoded; 0: only decoding tells
 };
 
-/// What a stored value v, an integer divided by its largest one, is: a = zero + v (one - zero) is
-/// the distance in scene units, or 1 / distance where `inverse`.
+/// What a stored value v, an integer divided by its largest one, is: a, the distance in scene
+/// units, or 1 / distance where `inverse`, goes evenly from `zero` (where v is `first`) to `one`
+/// (`last`).
 struct PhotoDepthCode {
     bool inverse = true;
     double zero = 0, one = 0;  ///< both 0: the file tells no scale
+    double first = 0, last = 1;
+    /// 1 / distance is not taken below it; 0: not below half a step.
+    double least = 0;
     /// Without a scale: the value 0 is what is nearest.
     bool zeroIsNear = false;
     bool alongRay = false;  ///< the distance is the length of the ray, not along the axis
@@ -42,11 +46,14 @@ struct PhotoDepthCode {
     [[nodiscard]] bool scaled() const { return zero != 0 || one != 0; }
     /// Takes `near` and `far` for the distances of the nearest and the farthest value.
     void setRange(double near, double far);
-    /// For codes without a scale: far is four times near, and the median of `values` (integers with
-    /// the largest `largest`) is at distance 1.
-    void assumeRange(const Image<float>& values, int largest);
+    /// The same of a code without a scale: of the nearest and the farthest of `values` (integers of
+    /// at most `largest`); where all are alike, of 0 and `largest`. `lossy`: they were coded as a
+    /// JPEG, and ends that are next to 0 or `largest` were these.
+    void setRange(double near, double far, const Image<float>& values, int largest, bool lossy);
+    /// For codes without a scale: the farthest of `values` (see setRange()) is four times as far as
+    /// the nearest, and their median is at distance 1.
+    void assumeRange(const Image<float>& values, int largest, bool lossy = false);
     /// Makes planar distances of integers with the largest `largest`, which may have a fraction.
-    /// 1 / distance is not taken below half a step from 0.
     void toDistances(Image<float>& values, const Camera& camera, int largest) const;
 };
 

@@ -65,9 +65,15 @@ Selection solve(const CoverProblem& problem, const SelectSettings& settings) {
     return s;
 }
 
-}  // namespace
-
-namespace {
+/// Errors where no view finds any sample of the surface.
+Result<Selection> solveOrFail(const CoverProblem& problem, const SelectSettings& settings) {
+    Selection selection = solve(problem, settings);
+    if (selection.views.empty())
+        return fail(ErrorCode::failed,
+                    "none of the {} views sees anything of the surface that their points make",
+                    problem.views.size());
+    return selection;
+}
 
 /// Errors where no view has a point; a note where some have none.
 Result<void> checkPoints(const std::vector<std::int64_t>& points, Job& job) {
@@ -103,7 +109,7 @@ Result<Selection> selectViews(const Bundle& bundle, const SelectSettings& settin
     STX_CHECK(job.checkCancelled());
     const auto problem = coverProblem(samples, candidates, settings.targetDensity);
     STX_CHECK(job.checkCancelled());
-    return solve(problem, settings);
+    return solveOrFail(problem, settings);
 }
 
 Result<Selection> selectViews(const ViewTable& table, const SelectSettings& settings, Job& job) {
@@ -126,7 +132,7 @@ Result<Selection> selectViews(const ViewTable& table, const SelectSettings& sett
     const std::int64_t all = std::accumulate(points.begin(), points.end(), std::int64_t{0});
     STX_TRY(const auto problem, coverProblem(table, all, samplesFor(settings, table.count()),
                                              settings.targetDensity, quiet));
-    return solve(problem, settings);
+    return solveOrFail(problem, settings);
 }
 
 Bundle keepViews(Bundle bundle, const std::vector<int>& views) {

@@ -41,7 +41,7 @@ struct Selection {
 
 /// Chooses the fewest views of a bundle that still cover its surface (CoverProblem). Views without
 /// points are never chosen (said with a note). Errors: settings out of range, a bundle that fails
-/// check() or has no point, cancelled.
+/// check() or has no point, points too near for any view to see their surface, cancelled.
 [[nodiscard]] Result<Selection> selectViews(const Bundle& bundle, const SelectSettings& settings,
                                             Job& job);
 

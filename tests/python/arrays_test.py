@@ -77,6 +77,11 @@ class Arrays(Case):
         np.testing.assert_array_equal(straight.colour, turned.colour)
         np.testing.assert_array_equal(straight.depth, turned.depth)
         self.assertEqual(straight.colour[0, 0, 3], 0)
+        depth[0, 0] = 0  # none, as sensors have it
+        zero = stx.View(colours, depth, camera)
+        np.testing.assert_array_equal(straight.depth, zero.depth)
+        np.testing.assert_array_equal(straight.colour, zero.colour)
+        self.assertEqual(straight.near_plane, zero.near_plane)
         np.testing.assert_array_equal(straight.colour[1:, :, :3], colours[1:])
         self.assertEqual(stx.View(colours, depth, camera, no_depth="unknown").colour[0, 0, 3], 255)
         linear = stx.View(colours.astype(np.float32) / 255, depth, camera)

@@ -2,6 +2,8 @@
 """Python and the program give the same bytes: of the sample model, and of random small scenes."""
 import os
 import random
+import subprocess
+import sys
 import unittest
 
 from harness import MODEL, Case, np, read, run, stx
@@ -61,6 +63,15 @@ class SamePictures(Case):
             run("render", kind, "-o", "p.exr", *at)
             stx.render(kind, camera, normals=True).save("q.exr")
             self.same("p.exr", "q.exr")
+
+    def test_materials_of_a_file_are_read(self):
+        maker = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "cli", "material_model.py")
+        subprocess.run([sys.executable, maker, "make", "m.gltf"], check=True)
+        run("convert", "m.gltf", "-o", "a.exr", "--views", "ring:2", "--size", "32x32", "--materials")
+        bundle = stx.convert("m.gltf", views="ring:2", size=(32, 32), materials=True)
+        self.assertIsNotNone(bundle.views[0].metallic_roughness)
+        bundle.save("b.exr")
+        self.same("a.exr", "b.exr")
 
     def test_a_path(self):
         bundle = stx.convert(MODEL, views="ring:4", size=(64, 64))

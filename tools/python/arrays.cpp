@@ -168,10 +168,10 @@ Texture textureFrom(py::handle value, const char* name, bool* hasAlpha) {
 }
 
 Image<float> depthFrom(py::handle value, const char* name) {
-    return copied<float>(
-        imageFrom(value, name, isImage(value, {"float16", "float32", "float64"}, {0}),
-                  "an array of floats (distances in scene units, infinite where there is none) and "
-                  "of shape (height, width)"));
+    return copied<float>(imageFrom(
+        value, name, isImage(value, {"float16", "float32", "float64"}, {0}),
+        "an array of floats (distances in scene units, infinite or 0 where there is none) "
+        "and of shape (height, width)"));
 }
 
 Image<glm::vec3> vectorsFrom(py::handle value, const char* name) {

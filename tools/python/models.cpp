@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <set>
 
 #include <pybind11/stl.h>
@@ -43,6 +44,8 @@ ViewPointer makeView(const py::object& colour, const py::object& depth, const Ca
     bool hasAlpha = false;
     view.texture = textureFrom(colour, "colour", &hasAlpha);
     view.depth = depthFrom(depth, "depth");
+    // As sensors and image sets have it: a surface at the viewpoint would have no size.
+    std::ranges::replace(view.depth.pixels(), 0.0f, kNoDepth);
     view.camera = camera;
     view.name = std::move(name);
     const auto missing = noDepthNamed(noDepth);
@@ -110,7 +113,7 @@ void bindView(py::module_& module) {
 
 colour: (height, width, 3 or 4), uint8 (sRGB) or float32 (linear light), straight alpha. depth:
 (height, width) floats, scene units to the plane through the viewpoint (not along the ray), infinite
-where there is none. Both are as large as the camera's picture; they are copied. name: unique in its
+or 0 where there is none. Both are as large as the camera's picture; they are copied. name: unique in its
 bundle (view000, ...). depth_bits: 8, 16 or 32 (floats, which only .exr holds): depth is rounded to what
 files hold. no_depth: what pixels without a depth are: 'empty' (nothing is there) or 'unknown' (not
 measured). normals: (height, width, 3), unit, world axes. Raises stx.Error (usage, invalidInput).)")

@@ -124,6 +124,43 @@ TEST(Export, IntegerDepthIsRoundedByNoMoreThanItsNoteSays) {
     }
 }
 
+/// From 1000 on MIV takes the farthest distance for infinite: a scene in millimetres has its views
+/// there, and so may even its nearest distance be.
+TEST(Export, ScenesInMillimetresComeBackFromMiv) {
+    Bundle bundle = smallBundle(2, 32, false, false);
+    for (ReferenceView& view : bundle.views) {
+        for (std::size_t p = 0; p < view.depth.count(); ++p) view.depth.data()[p] *= 2000;
+        view.nearPlane *= 2000;
+        view.farPlane *= 2000;
+        view.camera.position *= 2000;
+    }
+    bundle.bounds = bundle.computeBounds();
+    for (const bool floats : {false, true}) {
+        TemporaryFolder folder;
+        Job job;
+        ExportOptions options;
+        options.kind = Kind::miv;
+        if (!floats) options.depth = ExportOptions::Depth::png;
+        ASSERT_TRUE(exportViews(*viewsOf(bundle), folder / "set", options, job));
+        ImageSetOptions read;
+        read.depthBits = 32;
+        const auto back = readImageSet(folder / "set", read, job);
+        ASSERT_TRUE(back) << back.error().text();
+        for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+            const auto &a = bundle.views[i], &b = back->views[i];
+            const double allowed =
+                floats ? 0 : a.farPlane * a.farPlane / a.nearPlane / 65535 * 0.51;
+            for (std::size_t p = 0; p < a.depth.count(); ++p) {
+                const float d = a.depth.data()[p], e = b.depth.data()[p];
+                ASSERT_EQ(hasPoint(d), hasPoint(e));
+                if (hasPoint(d)) {
+                    ASSERT_NEAR(d, e, allowed);
+                }
+            }
+        }
+    }
+}
+
 TEST(Export, RefusesAForeignFolderAndLeavesItAlone) {
     TemporaryFolder folder;
     std::filesystem::create_directory(folder / "mine");

@@ -222,6 +222,71 @@ TEST(Rgbd, TumRecordingsAreAssociatedByTime) {
     expectError(readSet(folder.path()), {"groundtruth.txt", "line 1", "3 numbers"});
 }
 
+/// Of two colour images near one depth image the nearer one has it, and the other one none.
+TEST(Rgbd, ADepthImageOfTumIsUsedOnceAndByTheNearest) {
+    const auto views = roomViews(1);
+    TemporaryFolder folder;
+    const auto line = [](double time, const char* what) {
+        return fmt::format("{} {}\n", time, what);
+    };
+    const std::string pose = " 0 0 0 0 0 0 1\n";
+    // Times between the pictures' are 0.018, 0.012, 0.018 and 0.002 s: all below 0.02.
+    for (const char* name : {"a.png", "b.png", "c.png"}) writeColour(folder / name, views[0]);
+    for (const int i : {0, 1})
+        writeCodes(folder / fmt::format("d{}.png", i), 96, 64, 16,
+                   [i](int, int) { return 5000 * (i + 1); });
+    writeText(folder / "rgb.txt",
+              line(10.0, "a.png") + line(10.03, "b.png") + line(10.05, "c.png"));
+    writeText(folder / "depth.txt", line(10.018, "d0.png") + line(10.048, "d1.png"));
+    writeText(folder / "groundtruth.txt", "10.0" + pose + "10.03" + pose + "10.05" + pose);
+    writeText(folder / "intrinsics.txt", "80 80 48 32\n");
+    Job job;
+    ImageSetOptions options = keepAll();
+    options.depthBits = 32;
+    const auto read = readImageSet(folder.path(), options, job);
+    ASSERT_TRUE(read) << read.error().text();
+    ASSERT_EQ(read->views.size(), 2u);
+    EXPECT_EQ(read->views[0].name, "b");
+    EXPECT_EQ(read->views[0].depth.at(9, 9), 1.0f);
+    EXPECT_EQ(read->views[1].name, "c");
+    EXPECT_EQ(read->views[1].depth.at(9, 9), 2.0f);
+    const auto notes = job.takeNotes();
+    EXPECT_TRUE(std::ranges::any_of(notes, [](const std::string& note) {
+        return note.starts_with("1 of 3 colour images have no depth");
+    }));
+}
+
+/// Names without leading zeros: 10.png comes after 9.png, and pictures without a pose are noted.
+TEST(Open3d, NumbersInNamesSortAsNumbers) {
+    const auto views = roomViews(1);
+    TemporaryFolder folder;
+    std::string log;
+    for (int i = 0; i < 12; ++i) {
+        writeColour(folder / fmt::format("color/{}.png", i), views[0]);
+        writeCodes(folder / fmt::format("depth/{}.png", i), 96, 64, 16,
+                   [i](int, int) { return 1000 + i; });
+        if (i == 4) continue;
+        log += fmt::format("{} {} {}\n1 0 0 {}\n0 1 0 0\n0 0 1 0\n0 0 0 1\n", i, i, i + 1, i);
+    }
+    writeText(folder / "trajectory.log", log);
+    ImageSetOptions options = keepAll();
+    options.depthBits = 32;
+    const double k[4] = {80, 80, 48, 32};
+    std::copy(k, k + 4, options.intrinsics);
+    Job job;
+    const auto read = readImageSet(folder.path(), options, job);
+    ASSERT_TRUE(read) << read.error().text();
+    ASSERT_EQ(read->views.size(), 11u);
+    for (const ReferenceView& view : read->views) {
+        EXPECT_EQ(view.name, fmt::format("{:g}", view.camera.position.x));
+        EXPECT_NEAR(view.depth.at(9, 9), 1 + 0.001 * view.camera.position.x, 1e-5);
+    }
+    const auto notes = job.takeNotes();
+    EXPECT_TRUE(std::ranges::any_of(notes, [](const std::string& note) {
+        return note.starts_with("1 of 12 pictures has no pose");
+    }));
+}
+
 TEST(SevenScenes, ComesBackAndItsMissingValuesAreNone) {
     auto views = roomViews(1);
     ReferenceView& v = views[0];

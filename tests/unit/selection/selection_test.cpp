@@ -221,6 +221,25 @@ TEST(Selection, ViewsThatShareNothingAreAllKept) {
     EXPECT_DOUBLE_EQ(s->coverage, 1.0);
 }
 
+/// Distances that are lost beside the camera's position when a point is formed: no view sees any.
+TEST(Selection, OfPointsThatNoViewSeesIsRefused) {
+    Bundle bundle;
+    auto view = analytic::capture(analytic::sphere, analytic::lookingAt({0, 0, 3}, 32), 32);
+    for (std::size_t i = 0; i < view.depth.count(); ++i)
+        if (hasPoint(view.depth.data()[i])) view.depth.data()[i] = 1e-20f;
+    view.nearPlane = 1e-21;
+    view.farPlane = 1e-19;
+    bundle.views.push_back(view);
+    bundle.views.push_back(view);
+    Job job;
+    const auto refused = selectViews(bundle, {}, job);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::failed);
+    EXPECT_NE(refused.error().message.find("none of the 2 views"), std::string::npos)
+        << refused.error().message;
+    EXPECT_FALSE(selectViews(*viewsOf(bundle), {}, job));
+}
+
 /// A box open on one side that holds another, closed box: the inner one's surface is never seen.
 Mesh boxInBox() {
     Mesh mesh;

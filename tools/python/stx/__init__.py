@@ -39,10 +39,10 @@ def _is_path(value: object) -> bool:
     return isinstance(value, (str, os.PathLike))
 
 
-def _model(value: Any, *kinds: type, job: Job | None = None) -> Any:
-    """A model, opened where it is the name of a file; TypeError unless it is one of the kinds."""
+def _model(value: Any, *kinds: type, job: Job | None = None, materials: bool = False) -> Any:
+    """A model, opened (a mesh with its materials) where it is the name of a file; TypeError unless it is one of the kinds."""
     if _is_path(value):
-        value = _stx.open(value, {}, job)
+        value = _stx.open(value, {"materials": materials}, job)
     if not isinstance(value, kinds):
         names = ", ".join("stx." + kind.__name__ for kind in kinds)
         raise TypeError(f"this is {type(value).__name__}; {names} or the name of its file is expected")
@@ -102,7 +102,7 @@ def convert(model: Path | Mesh | Bundle | Atlas, *, views: str = "sphere:16", ca
     """
     options = {name: value for name, value in locals().items() if name not in ("model", "job")}
     options["cameras"], options["names"] = list(cameras), list(names)
-    return _stx.convert(_model(model, Mesh, Bundle, Atlas, job=job), options, job)
+    return _stx.convert(_model(model, Mesh, Bundle, Atlas, job=job, materials=materials), options, job)
 
 
 @overload
