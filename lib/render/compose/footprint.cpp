@@ -1,6 +1,7 @@
 #include "lib/render/compose/footprint.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -132,6 +133,20 @@ int Footprint::factor(const Camera& camera) const {
 
 namespace {
 
+/// The middle four of the pixels that become one are one surface within this share of their depth,
+/// as samples of a pixel are (kOneSurface of shaders/shared/surface_constants.glsl).
+constexpr float kOneDepth = 0.01f;
+
+/// Depth where four pixels meet: their mean where they are one surface, else the first of them that
+/// has a point.
+float depthAmid(const std::array<float, 4>& d) {
+    const auto [least, most] = std::minmax_element(d.begin(), d.end());
+    if (*least > 0.0f && hasPoint(*most) && *most - *least <= kOneDepth * *least)
+        return 0.25f * ((d[0] + d[3]) + (d[1] + d[2]));
+    const auto first = std::find_if(d.begin(), d.end(), hasPoint);
+    return first == d.end() ? kNoDepth : *first;
+}
+
 /// A row of minified() by 2 of colour and depth alone, which is what most pictures are.
 void halveRow(const Frame& large, int y, Frame& out) {
     const float* above = &large.colour.row(2 * y).data()->x;
@@ -146,16 +161,9 @@ void halveRow(const Frame& large, int y, Frame& out) {
         for (int c = 0; c < 4; ++c) sum[c] += below[c];
         for (int c = 0; c < 4; ++c) sum[c] += below[4 + c];
         for (int c = 0; c < 4; ++c) colour[c] = sum[c] * 0.25f;
-        // All four are as near to the centre: the first that is covered.
-        const float d[4] = {depthAbove[2 * x], depthAbove[2 * x + 1], depthBelow[2 * x],
-                            depthBelow[2 * x + 1]};
-        int covered = 0;
-        float first = kNoDepth;
-        for (int k = 3; k >= 0; --k) {
-            covered += hasPoint(d[k]) ? 1 : 0;
-            first = hasPoint(d[k]) ? d[k] : first;
-        }
-        depth[x] = covered >= 2 ? first : kNoDepth;
+        const std::array<float, 4> d{depthAbove[2 * x], depthAbove[2 * x + 1], depthBelow[2 * x],
+                                     depthBelow[2 * x + 1]};
+        depth[x] = std::ranges::count_if(d, hasPoint) >= 2 ? depthAmid(d) : kNoDepth;
     }
 }
 
@@ -192,6 +200,14 @@ Frame minified(const Frame& large, int factor) {
                     depth = d;
                 }
             }
+        }
+        // Of an even number none is in the middle.
+        if (const int middle = factor / 2; factor % 2 == 0) {
+            const auto at = [&](int i, int j) {
+                return large.depth.at(x * factor + middle - 1 + i, y * factor + middle - 1 + j);
+            };
+            const float amid = depthAmid({at(0, 0), at(1, 0), at(0, 1), at(1, 1)});
+            if (hasPoint(amid)) depth = amid;
         }
         out.colour.at(x, y) = colour * share;
         if (2 * covered >= factor * factor) out.depth.at(x, y) = depth;

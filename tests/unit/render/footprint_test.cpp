@@ -25,6 +25,32 @@ TEST(Footprint, CountsTheSamplesOfAPixel) {
     EXPECT_EQ(footprint.samplesPerPixel(away), 1.0);
 }
 
+TEST(Footprint, DepthIsThatAtThePixelsCentre) {
+    for (const int factor : {2, 3, 4}) {
+        for (const bool lit : {false, true}) {
+            Frame large;
+            large.colour = Image<glm::vec4>(8 * factor, 6 * factor, glm::vec4(1));
+            large.depth = Image<float>(8 * factor, 6 * factor);
+            if (lit) large.normal = Image<glm::vec3>(8 * factor, 6 * factor, {0, 0, 1});
+            const auto plane = [](double x, double y) { return 5 + 0.02 * x - 0.03 * y; };
+            for (int y = 0; y < large.depth.height(); ++y)
+                for (int x = 0; x < large.depth.width(); ++x)
+                    large.depth.at(x, y) =
+                        static_cast<float>(plane((x + 0.5) / factor, (y + 0.5) / factor));
+            // In front of all else: an edge is not averaged.
+            large.depth.at(2 * factor, 2 * factor) = 1;
+            const Frame small = minified(large, factor);
+            for (int y = 0; y < 6; ++y)
+                for (int x = 0; x < 8; ++x) {
+                    if (x == 2 && y == 2) continue;
+                    EXPECT_NEAR(small.depth.at(x, y), plane(x + 0.5, y + 0.5), 1e-5) << factor;
+                }
+            const float there = small.depth.at(2, 2);
+            EXPECT_TRUE(there == 1 || std::abs(there - plane(2.5, 2.5)) < 0.03) << there;
+        }
+    }
+}
+
 TEST(Footprint, SmallPicturesAreAveraged) {
     const Bundle bundle = analyticBundle(AnalyticScene::object, 8, 2);
     const Camera camera = smallCamera(4);
