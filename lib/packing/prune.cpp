@@ -226,6 +226,19 @@ void smoothFarColours(const Image<std::uint8_t>& state, Image<Colour>& colour) {
     }
 }
 
+/// Whether depth is missing in a view where it has no full alpha, and only there: of a masked
+/// photograph what is not pruned is then known to be empty. Where it is missing nowhere, as in
+/// pictures of a room, all that is not kept is pruned, and NoDepth::unknown may say so.
+bool onlyEmptyPixelsLackDepth(const ReferenceView& view) {
+    bool any = false;
+    for (std::size_t i = 0; i < view.depth.count(); ++i) {
+        if (hasPoint(view.depth.data()[i])) continue;
+        if (view.texture.alpha(i) >= 1.0f) return false;
+        any = true;
+    }
+    return any;
+}
+
 Result<void> checkSettings(const PruneSettings& s) {
     if (s.budget < 0)
         return fail(ErrorCode::usage, "a budget of {} pixels cannot be kept", s.budget);
@@ -259,6 +272,7 @@ void keepOnly(const Image<std::uint8_t>& kept, ReferenceView& view) {
     }
     if (!any) return;
     view.pruned = true;
+    if (onlyEmptyPixelsLackDepth(view)) view.noDepth = NoDepth::empty;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             if (!kept.at(x, y)) continue;
@@ -379,8 +393,11 @@ class PrunedViews : public ViewsOver {
 std::unique_ptr<ViewTable> prunedTable(const ViewTable& table, std::unique_ptr<ViewTable> own,
                                        Pruning pruning) {
     Bundle headers = headersOf(table.about());
-    for (std::size_t i = 0; i < headers.views.size(); ++i)
-        if (pruning.changed[i]) headers.views[i].pruned = true;
+    for (std::size_t i = 0; i < headers.views.size(); ++i) {
+        if (!pruning.changed[i]) continue;
+        headers.views[i].pruned = true;
+        headers.views[i].noDepth = pruning.noDepth[i];
+    }
     return std::make_unique<PrunedViews>(table, std::move(own), std::move(headers),
                                          std::move(pruning));
 }
@@ -410,11 +427,13 @@ Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& setting
     PruneReport& report = out.report;
     std::vector<PruneView> views(table.count());
     std::vector<std::int64_t> points(table.count());
+    out.noDepth.resize(table.count());
     STX_CHECK(forEachView(
         table, kPreparing, job,
         [&](std::size_t i, const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
             views[i] = preparePruning(*view);
             points[i] = view->pointCount();
+            out.noDepth[i] = onlyEmptyPixelsLackDepth(*view) ? NoDepth::empty : view->noDepth;
             return {};
         }));
     for (const std::int64_t n : points) report.sourcePixels += n;

@@ -88,6 +88,31 @@ TEST(Prune, TakenPixelsClaimNoEmptySpace) {
     }
 }
 
+TEST(Prune, MaskedViewsOfUnknownDepthStayEmptyAround) {
+    // Photographs with depth that were cut out: unknown depth is possible, but no pixel has it.
+    Bundle bundle = torusViews();
+    for (ReferenceView& view : bundle.views) view.noDepth = NoDepth::unknown;
+    Job job;
+    PackSettings settings;
+    settings.layout = PackSettings::Layout::tight;
+    settings.sourcePixels = bundle.pointCount();
+    ASSERT_TRUE(prune(bundle, {}, job));
+    ASSERT_TRUE(bundle.pruned());
+    const auto atlas = pack(bundle, settings, job);
+    ASSERT_TRUE(atlas);
+    const auto unpacked = unpack(*atlas, job);
+    ASSERT_TRUE(unpacked);
+    for (const ReferenceView& view : unpacked->views) EXPECT_EQ(view.texture.at(0, 0).a, 0);
+
+    // One pixel of unknown depth, and the view keeps the mark.
+    Bundle withHole = torusViews();
+    ReferenceView& view = withHole.views[0];
+    view.noDepth = NoDepth::unknown;
+    view.texture.rgba8()->at(0, 0) = {90, 90, 90, 255};
+    ASSERT_TRUE(prune(withHole, {}, job));
+    EXPECT_EQ(view.noDepth, NoDepth::unknown);
+}
+
 TEST(Prune, BudgetsAndQualitiesAreKept) {
     const Bundle before = torusViews();
     Job job;
