@@ -9,6 +9,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/model/views_over.hpp"
+#include "lib/packing/packing.hpp"
 #include "lib/packing/redundancy.hpp"
 #include "lib/packing/views_one_by_one.hpp"
 #include "lib/selection/coverage.hpp"
@@ -226,19 +227,6 @@ void smoothFarColours(const Image<std::uint8_t>& state, Image<Colour>& colour) {
     }
 }
 
-/// Whether depth is missing in a view where it has no full alpha, and only there: of a masked
-/// photograph what is not pruned is then known to be empty. Where it is missing nowhere, as in
-/// pictures of a room, all that is not kept is pruned, and NoDepth::unknown may say so.
-bool onlyEmptyPixelsLackDepth(const ReferenceView& view) {
-    bool any = false;
-    for (std::size_t i = 0; i < view.depth.count(); ++i) {
-        if (hasPoint(view.depth.data()[i])) continue;
-        if (view.texture.alpha(i) >= 1.0f) return false;
-        any = true;
-    }
-    return any;
-}
-
 Result<void> checkSettings(const PruneSettings& s) {
     if (s.budget < 0)
         return fail(ErrorCode::usage, "a budget of {} pixels cannot be kept", s.budget);
@@ -272,7 +260,7 @@ void keepOnly(const Image<std::uint8_t>& kept, ReferenceView& view) {
     }
     if (!any) return;
     view.pruned = true;
-    if (onlyEmptyPixelsLackDepth(view)) view.noDepth = NoDepth::empty;
+    if (lacksDepthByMask(view)) view.noDepth = NoDepth::empty;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             if (!kept.at(x, y)) continue;
@@ -433,7 +421,7 @@ Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& setting
         [&](std::size_t i, const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
             views[i] = preparePruning(*view);
             points[i] = view->pointCount();
-            out.noDepth[i] = onlyEmptyPixelsLackDepth(*view) ? NoDepth::empty : view->noDepth;
+            out.noDepth[i] = lacksDepthByMask(*view) ? NoDepth::empty : view->noDepth;
             return {};
         }));
     for (const std::int64_t n : points) report.sourcePixels += n;
