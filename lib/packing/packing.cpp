@@ -187,6 +187,32 @@ std::int64_t objectPixels(const ReferenceView& view) {
 
 namespace {
 
+/// Pixels without a depth.
+struct LackingPixels {
+    std::int64_t empty = 0, covered = 0;
+
+    void add(float depth, float alpha) {
+        if (!hasPoint(depth)) (alpha < 1.0f ? empty : covered) += 1;
+    }
+    [[nodiscard]] bool masked() const { return empty > covered; }
+};
+
+/// The same as lacksDepthByMask(), of what an atlas keeps of a view.
+bool showsMask(const Atlas& atlas, std::size_t view) {
+    const Camera& camera = atlas.views[view].camera;
+    LackingPixels lacking;
+    for (const AtlasRectangle& r : atlas.rectangles) {
+        if (r.view != static_cast<int>(view)) continue;
+        const AtlasPage& page = atlas.pages[r.page];
+        forEachPixel(r, {camera.width, camera.height}, atlas.padding,
+                     [&](glm::ivec2 p, glm::ivec2) {
+                         if (page.depth.contains(p.x, p.y))
+                             lacking.add(page.depth.at(p.x, p.y), page.texture.at(p.x, p.y).a);
+                     });
+    }
+    return lacking.masked();
+}
+
 Result<void> checkSettings(const ViewTable& table, const PackSettings& settings) {
     if (settings.padding < 0 || settings.padding > 64)
         return fail(ErrorCode::usage, "the padding is {} pixels; 0 to 64 is possible",
@@ -325,13 +351,20 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     return pack(*viewsOf(bundle), settings, job);
 }
 
+bool lacksDepthByMask(const ReferenceView& view) {
+    LackingPixels lacking;
+    for (std::size_t i = 0; i < view.depth.count(); ++i)
+        lacking.add(view.depth.data()[i], view.texture.alpha(i));
+    return lacking.masked();
+}
+
 std::vector<std::uint64_t> outsideBits(const Atlas& atlas, std::size_t of) {
     constexpr int kMostReach = 6;  // pixels
     const Camera& camera = atlas.views[of].camera;
     std::vector<std::uint64_t> bits(
         (static_cast<std::size_t>(camera.width) * camera.height + 63) / 64, 0);
     // Nothing is known there, wherever others look.
-    if (atlas.views[of].noDepth == NoDepth::unknown) {
+    if (atlas.views[of].noDepth == NoDepth::unknown && !showsMask(atlas, of)) {
         std::ranges::fill(bits, ~std::uint64_t{0});
         return bits;
     }

@@ -68,9 +68,14 @@ struct JoinedObjects {
 /// a point, or in another colour space than the first.
 [[nodiscard]] Result<JoinedObjects> joinObjects(std::vector<PackObject> objects, Job& job);
 
+/// Whether most pixels of a view that lack a depth have less than full alpha, as of a masked
+/// photograph: they are empty. Photographs that fill their frame lack it where a sensor missed it.
+[[nodiscard]] bool lacksDepthByMask(const ReferenceView& view);
+
 /// A bit for each pixel of a view, row by row: set where the object is, or may be, even where no
 /// rectangle shows it. That is where points of other views fall, a little generously, and
-/// everywhere in a view whose missing depth is unknown. The atlas must pass check().
+/// everywhere in a view whose missing depth is unknown, unless its rectangles and their padding
+/// show that it is masked as lacksDepthByMask() says. The atlas must pass check().
 [[nodiscard]] std::vector<std::uint64_t> outsideBits(const Atlas& atlas, std::size_t view);
 
 /// The bundle of an atlas: every pixel of every rectangle back in its view. Pixels in no rectangle

@@ -9,6 +9,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/model/views_over.hpp"
+#include "lib/packing/packing.hpp"
 #include "lib/packing/redundancy.hpp"
 #include "lib/packing/views_one_by_one.hpp"
 #include "lib/selection/coverage.hpp"
@@ -259,6 +260,7 @@ void keepOnly(const Image<std::uint8_t>& kept, ReferenceView& view) {
     }
     if (!any) return;
     view.pruned = true;
+    if (lacksDepthByMask(view)) view.noDepth = NoDepth::empty;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             if (!kept.at(x, y)) continue;
@@ -379,8 +381,11 @@ class PrunedViews : public ViewsOver {
 std::unique_ptr<ViewTable> prunedTable(const ViewTable& table, std::unique_ptr<ViewTable> own,
                                        Pruning pruning) {
     Bundle headers = headersOf(table.about());
-    for (std::size_t i = 0; i < headers.views.size(); ++i)
-        if (pruning.changed[i]) headers.views[i].pruned = true;
+    for (std::size_t i = 0; i < headers.views.size(); ++i) {
+        if (!pruning.changed[i]) continue;
+        headers.views[i].pruned = true;
+        headers.views[i].noDepth = pruning.noDepth[i];
+    }
     return std::make_unique<PrunedViews>(table, std::move(own), std::move(headers),
                                          std::move(pruning));
 }
@@ -410,11 +415,13 @@ Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& setting
     PruneReport& report = out.report;
     std::vector<PruneView> views(table.count());
     std::vector<std::int64_t> points(table.count());
+    out.noDepth.resize(table.count());
     STX_CHECK(forEachView(
         table, kPreparing, job,
         [&](std::size_t i, const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
             views[i] = preparePruning(*view);
             points[i] = view->pointCount();
+            out.noDepth[i] = lacksDepthByMask(*view) ? NoDepth::empty : view->noDepth;
             return {};
         }));
     for (const std::int64_t n : points) report.sourcePixels += n;

@@ -33,6 +33,7 @@ struct Pruning {
     PruneReport report;
     std::vector<Image<std::uint8_t>> kept;  ///< 1 = a point that stays
     std::vector<bool> changed;              ///< some point goes
+    std::vector<NoDepth> noDepth;           ///< of views that change, then
 };
 /// Takes what pruning does not keep out of the views of a bundle in memory.
 void applyPruning(const Pruning& pruning, Bundle& bundle);

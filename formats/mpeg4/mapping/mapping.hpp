@@ -97,6 +97,9 @@ struct SceneWriteOptions {
     /// Range of each view's splats in scene units, of a sequence whose frames share it; empty or 0:
     /// the largest that the view has.
     std::vector<float> splatRanges;
+    /// Where each view's depth is unknown, of a sequence without alpha (see UnknownPixels::text());
+    /// empty: as its picture says.
+    std::vector<std::string> unknownWhere;
 };
 
 /// A presentation of a bundle: Group { WorldInfo, DepthImage..., Background, Viewpoint,

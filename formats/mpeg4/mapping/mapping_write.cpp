@@ -123,7 +123,9 @@ class SceneWriter {
                 continue;
             ViewNotes::Layer& of = notes.views[key].layers[static_cast<int>(k)];
             if (view.pruned) of.pruned = images[k].unknown;
-            if (unknown) of.unknown = images[k].unknown;
+            if (unknown)
+                of.unknown = options_.unknownWhere.empty() ? images[k].unknown
+                                                           : options_.unknownWhere[i + k];
             of.background = view.background;
             of.refined = view.refined;
         }

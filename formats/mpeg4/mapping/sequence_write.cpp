@@ -12,6 +12,7 @@
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mapping/video_write.hpp"
 #include "formats/mpeg4/mapping/view_images.hpp"
+#include "formats/mpeg4/mapping/view_notes.hpp"
 #include "formats/video/video_process.hpp"
 #include "lib/model/same_pictures.hpp"
 #include "lib/model/view_table.hpp"
@@ -25,8 +26,9 @@ struct ViewRange {
     int depthBits = 8;
     float longestSplat = 0;
     bool normals = false, splats = false;
-    bool everUnknown = false, alwaysUnknown = true;  ///< NoDepth::unknown, of its frames
-    Refined refined;  ///< steps of the first frame, and the largest doubt
+    bool everUnknown = false;  ///< NoDepth::unknown, of its frames
+    UnknownPixels unknown;     ///< of films whose pictures have no alpha
+    Refined refined;           ///< steps of the first frame, and the largest doubt
 };
 
 /// The images of a SimpleTexture, in the order in which they are coded.
@@ -137,8 +139,7 @@ class SequenceWriter {
             view.farPlane = ranges_[k].farPlane;
             view.depthBits = ranges_[k].depthBits;
             // A note says it of the whole film; alpha, where it is written, of each frame.
-            const bool alpha = !asVideo() && options_.texture == SceneWriteOptions::Texture::png;
-            const bool unknown = alpha ? ranges_[k].everUnknown : ranges_[k].alwaysUnknown;
+            const bool unknown = hasAlpha() ? ranges_[k].everUnknown : ranges_[k].unknown.any();
             view.noDepth = unknown ? NoDepth::unknown : NoDepth::empty;
             view.refined = ranges_[k].refined;
         }
@@ -180,7 +181,11 @@ class SequenceWriter {
                 return tl::unexpected(done.error().at(fmt::format("view '{}'", view.name)));
             return {};
         };
-        if (about.bounds && table.planesKnown() &&
+        const bool unknown =
+            !hasAlpha() && std::ranges::any_of(about.views, [](const ViewHeader& view) {
+                return view.noDepth == NoDepth::unknown;
+            });
+        if (about.bounds && table.planesKnown() && !unknown &&
             std::ranges::none_of(table.kinds(), &ViewImageKinds::hasSplats)) {
             for (std::size_t k = 0; k < table.count(); ++k) STX_CHECK(look(k, about.views[k], 0));
         } else {
@@ -188,6 +193,7 @@ class SequenceWriter {
                 table, {"reading", 0}, job,
                 [&](std::size_t k, std::shared_ptr<const ReferenceView> view) -> Result<void> {
                     if (!about.bounds) bounds[k] = view->computeBounds();
+                    if (!hasAlpha()) lookAtUnknown(*view, ranges[k].unknown);
                     return look(k, *view, view->hasSplats() ? longestSplatOf(*view) : 0);
                 }));
         }
@@ -198,6 +204,12 @@ class SequenceWriter {
             bounds_.add(here.max);
         }
         return {};
+    }
+    static void lookAtUnknown(const ReferenceView& view, UnknownPixels& unknown) {
+        if (view.noDepth == NoDepth::empty) return;
+        bool clamped = false;
+        const Rgba8Image* own = view.texture.rgba8();
+        unknown.add(own ? *own : rgba8FromTexture(view.texture, clamped), view.depth);
     }
     Result<void> widen(ViewRange& range, const ViewHeader& view, const ViewImageKinds& kinds,
                        float longestSplat, bool first) const {
@@ -210,14 +222,15 @@ class SequenceWriter {
         if (range.normals != kinds.normal || range.splats != kinds.hasSplats())
             return fail(ErrorCode::unsupported,
                         "normals or splats are there in some frames only; bake all or none");
-        if (view.pruned && (asVideo() || options_.texture == SceneWriteOptions::Texture::jpeg))
+        if (view.pruned && !hasAlpha())
             return fail(ErrorCode::unsupported,
                         "a pruned view that moves keeps its mark in the alpha of its colour, "
                         "which {} does not have; use PNG",
                         asVideo() ? "H.264" : "JPEG");
-        const bool unknown = view.noDepth == NoDepth::unknown;
-        range.everUnknown = range.everUnknown || unknown;
-        range.alwaysUnknown = range.alwaysUnknown && unknown;
+        if (view.noDepth == NoDepth::unknown)
+            range.everUnknown = true;
+        else
+            range.unknown.addEmpty();
         range.nearPlane = std::min(range.nearPlane, view.nearPlane);
         range.farPlane = std::max(range.farPlane, view.farPlane);
         range.depthBits = std::max(range.depthBits, view.depthBits);
@@ -234,6 +247,11 @@ class SequenceWriter {
         SceneWriteOptions options = options_;
         for (const ViewRange& range : ranges_)
             options.splatRanges.push_back(range.splats ? range.longestSplat : 0);
+        for (const ViewRange& range : ranges_) {
+            if (hasAlpha()) break;
+            options.unknownWhere.emplace_back();
+            if (range.unknown.any()) STX_SET(options.unknownWhere.back(), range.unknown.text());
+        }
         std::vector<ViewBefore> before(table->count());
         table = watchedViews(std::move(table), [&](std::size_t k, const ReferenceView& view) {
             before[k] = ViewBefore::of(view);
@@ -372,6 +390,9 @@ class SequenceWriter {
         return images;
     }
     [[nodiscard]] bool asVideo() const { return options_.h264 >= 0; }
+    [[nodiscard]] bool hasAlpha() const {
+        return !asVideo() && options_.texture == SceneWriteOptions::Texture::png;
+    }
 
     [[nodiscard]] Result<Padding> paddingOf(const Camera& camera) const {
         return centringPadding(camera, std::min(job_.limits.maxImageSide, 65535));

@@ -78,7 +78,7 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
     if (!own) coded = rgba8FromTexture(view.texture, out.clamped);
     const Rgba8Image& colour = own ? *own : coded;
     const bool alpha = !alphaFollowsDepth(colour, view.depth);
-    if (mayBeUnknown) out.unknown = options.h264 >= 0 ? kUnknownAll : kUnknownInAlpha;
+    if (mayBeUnknown) out.unknown = kUnknownInAlpha;
     if (options.texture == SceneWriteOptions::Texture::jpeg) {
         out.coverageLost = !alphaFollowsDepth(colour, view.depth, mayBeUnknown);
         if (mayBeUnknown) STX_SET(out.unknown, unknownMask(colour, view.depth));

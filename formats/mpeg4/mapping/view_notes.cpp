@@ -139,16 +139,31 @@ void removePadding(ReferenceView& view, const ViewNotes::Pad& pad) {
     c.cy = pad.cy;
 }
 
-Result<std::string> unknownMask(const Rgba8Image& texture, const Image<float>& depth) {
-    bool all = true;
-    for (std::size_t i = 0; i < texture.count() && all; ++i)
-        all = texture.pixels()[i].a == 255 || hasPoint(depth.pixels()[i]);
-    if (all) return kUnknownAll;
-    std::vector<std::uint8_t> grey(texture.count());
-    for (std::size_t i = 0; i < grey.size(); ++i)
-        grey[i] = texture.pixels()[i].a == 255 && !hasPoint(depth.pixels()[i]) ? 255 : 0;
-    STX_TRY(const auto png, encodePng(texture.width(), texture.height(), 1, 8, grey.data(), false));
+void UnknownPixels::add(const Rgba8Image& texture, const Image<float>& depth) {
+    size_ = {texture.width(), texture.height()};
+    for (std::size_t i = 0; i < texture.count(); ++i) {
+        if (hasPoint(depth.data()[i])) continue;
+        if (texture.data()[i].a != 255) {
+            elsewhere_ = true;
+            continue;
+        }
+        unknown_.resize(texture.count());
+        unknown_[i] = true;
+    }
+}
+
+Result<std::string> UnknownPixels::text() const {
+    if (!elsewhere_) return kUnknownAll;
+    std::vector<std::uint8_t> grey(static_cast<std::size_t>(size_.x) * size_.y);
+    for (std::size_t i = 0; i < unknown_.size(); ++i) grey[i] = unknown_[i] ? 255 : 0;
+    STX_TRY(const auto png, encodePng(size_.x, size_.y, 1, 8, grey.data(), false));
     return encodeBase64(png);
+}
+
+Result<std::string> unknownMask(const Rgba8Image& texture, const Image<float>& depth) {
+    UnknownPixels pixels;
+    pixels.add(texture, depth);
+    return pixels.text();
 }
 
 Result<void> applyUnknownMask(ReferenceView& view, const std::string& mask, const Limits& limits) {

@@ -74,8 +74,25 @@ void removePadding(ReferenceView& view, const ViewNotes::Pad& pad);
 
 /// What a note says of a view whose alpha is written, and of one that is opaque all over.
 inline constexpr const char *kUnknownInAlpha = "alpha", *kUnknownAll = "all";
-/// The pixels of full alpha without a depth, as a note's text: kUnknownAll where no pixel is
-/// without both, else a PNG of grey in base64.
+/// The pixels of full alpha without a depth, of one picture of a view or of a film's together: a
+/// note is of the whole film, so what is unknown in one picture is so in all that have no depth
+/// there.
+class UnknownPixels {
+  public:
+    void add(const Rgba8Image& texture, const Image<float>& depth);
+    /// A picture with NoDepth::empty.
+    void addEmpty() { elsewhere_ = true; }
+    /// Whether a pixel is unknown, or all would be that have no depth.
+    [[nodiscard]] bool any() const { return !unknown_.empty() || !elsewhere_; }
+    /// A note's text: kUnknownAll where no pixel is without both, else a PNG of grey in base64.
+    [[nodiscard]] Result<std::string> text() const;
+
+  private:
+    glm::ivec2 size_{0};
+    std::vector<bool> unknown_;  ///< row by row; empty: none
+    bool elsewhere_ = false;     ///< some pixel has neither depth nor full alpha
+};
+/// The same of one picture.
 [[nodiscard]] Result<std::string> unknownMask(const Rgba8Image& texture, const Image<float>& depth);
 /// Gives a view of 8-bit colour the alpha that a mask says. Errors: the mask is not such a PNG, or
 /// has another size than the view.

@@ -356,7 +356,8 @@ void SurfaceRenderer::fill(const SurfaceFrame& work, Frame& frame, Image<float>&
         });
     } else if (settings_.does(Stage::holes)) {
         finishStage(settings_.log.get(), "holes", frame.colour, [&] {
-            fillUnseen({frame.colour, q, space, frame.normal.empty() ? nullptr : &frame.normal},
+            fillUnseen({frame.colour, q, space, frame.normal.empty() ? nullptr : &frame.normal,
+                        bounds_.radius()},
                        all, settings_.fill == Fill::none ? 0 : kWidestHole);
         });
     }

@@ -88,6 +88,60 @@ TEST(Prune, TakenPixelsClaimNoEmptySpace) {
     }
 }
 
+TEST(Prune, MaskedViewsOfUnknownDepthStayEmptyAround) {
+    // Photographs with depth that were cut out: unknown depth is possible, but no pixel has it.
+    Bundle bundle = torusViews();
+    for (ReferenceView& view : bundle.views) view.noDepth = NoDepth::unknown;
+    Job job;
+    PackSettings settings;
+    settings.layout = PackSettings::Layout::tight;
+    settings.sourcePixels = bundle.pointCount();
+    ASSERT_TRUE(prune(bundle, {}, job));
+    ASSERT_TRUE(bundle.pruned());
+    const auto atlas = pack(bundle, settings, job);
+    ASSERT_TRUE(atlas);
+    const auto unpacked = unpack(*atlas, job);
+    ASSERT_TRUE(unpacked);
+    for (const ReferenceView& view : unpacked->views) EXPECT_EQ(view.texture.at(0, 0).a, 0);
+
+    // A photograph that fills its frame keeps the mark: nothing is known where its sensor failed.
+    Bundle filled = torusViews();
+    ReferenceView& photo = filled.views[0];
+    photo.noDepth = NoDepth::unknown;
+    for (glm::u8vec4& c : photo.texture.rgba8()->pixels()) c.a = 255;
+    ASSERT_TRUE(prune(filled, {}, job));
+    EXPECT_EQ(photo.noDepth, NoDepth::unknown);
+    const auto filledAtlas = pack(filled, settings, job);
+    ASSERT_TRUE(filledAtlas);
+    const auto filledAgain = unpack(*filledAtlas, job);
+    ASSERT_TRUE(filledAgain);
+    EXPECT_EQ(filledAgain->views[0].texture.at(0, 0).a, 1);
+}
+
+TEST(Prune, AHoleOfTheSensorDoesNotFillWhatIsAroundAMask) {
+    Bundle bundle = torusViews();
+    Job job;
+    PackSettings settings;
+    settings.layout = PackSettings::Layout::tight;
+    for (ReferenceView& view : bundle.views) {
+        view.noDepth = NoDepth::unknown;
+        const auto points = view.depth.pixels();
+        const auto first = std::find_if(points.begin(), points.end(), hasPoint);
+        *(first + 1) = kNoDepth;  // with full alpha
+    }
+    settings.sourcePixels = bundle.pointCount() + static_cast<int>(bundle.views.size());
+    for (const bool pruned : {false, true}) {
+        if (pruned) {
+            ASSERT_TRUE(prune(bundle, {}, job));
+        }
+        const auto atlas = pack(bundle, settings, job);
+        ASSERT_TRUE(atlas);
+        const auto unpacked = unpack(*atlas, job);
+        ASSERT_TRUE(unpacked);
+        for (const ReferenceView& view : unpacked->views) EXPECT_EQ(view.texture.at(0, 0).a, 0);
+    }
+}
+
 TEST(Prune, BudgetsAndQualitiesAreKept) {
     const Bundle before = torusViews();
     Job job;

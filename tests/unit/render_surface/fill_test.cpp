@@ -1,6 +1,7 @@
 // What no source saw: backgrounds of scenes that fill the frame.
 
 #include <algorithm>
+#include <limits>
 #include <span>
 
 #include <gtest/gtest.h>
@@ -207,6 +208,24 @@ TEST(FillUnseen, TheOutlineOfAHoleThatASourceSeesThroughStaysOpen) {
     fillUnseen({p.albedo, p.q, p.space}, {&local, 1}, 0);
     EXPECT_EQ(p.albedo.at(kFirst + 4, kFirst + 4).a, 0.0f);
     for (int y = kFirst; y < kEnd; ++y) EXPECT_FLOAT_EQ(p.albedo.at(kFirst - 1, y).a, 0.4f) << y;
+}
+
+// What a source sees to end far behind the hole, compared with the scene, does not close it,
+// however little that is of the eye's distance.
+TEST(FillUnseen, FromFarAwayWhatIsBehindTheSceneClosesNoHole) {
+    constexpr int kSide = 64, kFirst = 30, kEnd = 34;
+    for (const double radius : {std::numeric_limits<double>::infinity(), 0.5, 0.01}) {
+        Picture p(kSide, kSide);
+        for (int y = 0; y < kSide; ++y)
+            for (int x = 0; x < kSide; ++x)
+                if (x < kFirst || y < kFirst || x >= kEnd || y >= kEnd)
+                    p.close(x, y, glm::vec3(0.5f), 0.5f);
+        p.fillWith(p.space.camera, 2.06f, 10, [&](OpenFrame frame, auto sources) {
+            frame.radius = radius;
+            fillUnseen(frame, sources, 0);
+        });
+        EXPECT_EQ(p.albedo.at(kFirst + 1, kFirst + 1).a, radius < 0.1 ? 0.0f : 1.0f) << radius;
+    }
 }
 
 TEST(FillUnseen, AHoleAtTheBorderIsFilledAndACornerIsNot) {

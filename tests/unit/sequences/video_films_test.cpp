@@ -155,6 +155,54 @@ TEST(VideoFilms, WrittenDepthIsExactToItsBits) {
     EXPECT_TRUE(said("lossless H.264 of 8 or 10 bits"));
 }
 
+/// FarMovingViews as a masked sensor sees them: unknown depth is possible. The first view has it at
+/// a pixel of one frame, the second at none.
+class MaskedViews : public FarMovingViews {
+  public:
+    static constexpr glm::ivec2 kUnknown{6, 5};
+
+    using FarMovingViews::FarMovingViews;
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        auto bundle = FarMovingViews::frame(index, job);
+        for (ReferenceView& view : bundle->views) view.noDepth = NoDepth::unknown;
+        if (index == 1)
+            bundle->views[0].depth.at(kUnknown.x, kUnknown.y) = kNoDepth;  // with full alpha
+        return bundle;
+    }
+};
+
+void expectEmptyIsKept(const SaveOptions& save) {
+    const TemporaryFolder folder;
+    MaskedViews frames(3);
+    Job job;
+    const auto done = saveSequence(frames, folder / "a.mp4", save, job);
+    ASSERT_TRUE(done) << done.error().text();
+    const auto read = openSequence(folder / "a.mp4", {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    for (std::size_t k = 0; k < 3; ++k) {
+        const auto is = (*read)->frame(k, job);
+        ASSERT_TRUE(is) << is.error().text();
+        EXPECT_EQ(is->views[0].noDepth, NoDepth::unknown);
+        EXPECT_EQ(is->views[1].noDepth, NoDepth::empty);
+        for (const ReferenceView& view : is->views)
+            EXPECT_EQ(view.texture.at(2, 3).a, 0) << "frame " << k;
+        EXPECT_EQ(is->views[0].texture.at(MaskedViews::kUnknown.x, MaskedViews::kUnknown.y).a, 1);
+    }
+}
+
+TEST(VideoFilms, WhatIsEmptyStaysSo) {
+    REQUIRE_VIDEO();
+    SaveOptions save;
+    save.h264 = 6;
+    expectEmptyIsKept(save);
+}
+
+TEST(VideoFilms, WhatIsEmptyStaysSoInJpeg) {
+    SaveOptions save;
+    save.jpegQuality = 92;
+    expectEmptyIsKept(save);
+}
+
 TEST(VideoFilms, FfmpegReadsWhatWeWrite) {
     REQUIRE_VIDEO();
     Written film(30);

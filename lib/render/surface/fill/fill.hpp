@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <span>
 
 #include "lib/base/image.hpp"
@@ -14,6 +15,8 @@ struct OpenFrame {
     Image<float>& q;           ///< of the main surface of each pixel, 0 = none
     const PixelSpace& space;
     Image<glm::vec3>* normal = nullptr;  ///< world, zero where unknown; null when not wanted
+    /// Of all that may be seen, scene units: see fillUnseen().
+    double radius = std::numeric_limits<double>::infinity();
 };
 
 /// Fills holes that no source looks into: where a stretch of the ray is hidden from every source,
@@ -21,7 +24,8 @@ struct OpenFrame {
 /// ones only). Gaps that a source sees through stay open. Depth and normal are those of the surface
 /// that continues there: the planes of the surfaces around are followed into the hole, and the
 /// nearest that no source sees past counts. Where all end, depth is where the hidden stretch
-/// begins, and the normal stays as it is.
+/// begins, and the normal stays as it is. How far around surfaces that is looked for grows with
+/// their distance, up to that of an eye 16 times the radius away.
 void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int widest);
 
 /// Fills what is open from the background around it: for scenes that fill the frame. Filled is what

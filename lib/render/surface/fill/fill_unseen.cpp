@@ -30,9 +30,15 @@ struct WideVotes : SourcePixels {
 namespace {
 
 // Where no source is named the value was chosen by trial on the project's image sets and meshes.
-// Shares are of q, see DepthAxis::relativeScale().
+// Shares are of q, see shareScale().
 
 // Holes that no source looks into (fillUnseen).
+/// Shares are of no distance beyond so many times the scene's radius: from farther away, with a
+/// narrower field of view, they would be more than the scene is deep. Ten models from 60
+/// radii: 38.3
+/// -> 43.4 dB, alike with 8 and 24. Nearer eyes, which see all of the scene in more than 7.2
+/// degrees, change nothing.
+constexpr double kMostRadii = 16.0;
 /// How far surface is looked for in each direction around a small hole, pixels, and directions that
 /// must meet some, of eight: see enclosed().
 constexpr int kSmallReach = 12;
@@ -49,6 +55,13 @@ constexpr float kFirstChange = 0.02f, kNextChange = 0.005f;
 /// Colours of rims in front of the fill, by more than this share of q, weigh less by this; those of
 /// surfaces that end before the pixel by the other.
 constexpr float kForeground = 0.01f, kForegroundWeight = 0.1f, kEndedWeight = 0.2f;
+
+/// What a relative depth difference of 1 is in q.
+float shareScale(const OpenFrame& frame, float q) {
+    const DepthAxis& axis = frame.space.axis;
+    return std::min(axis.relativeScale(q),
+                    static_cast<float>(kMostRadii * frame.radius) * axis.qPerUnit(q));
+}
 
 /// Where a direction from an open pixel meets surface.
 struct Rim {
@@ -104,7 +117,7 @@ float hiddenDepth(std::span<const LocalSource> sources, float x, float y, float 
 /// How much q changes from each pixel to the next behind a rim at (x, y), 0 where the surface ends
 /// there.
 float slopeBehind(const OpenFrame& frame, int x, int y, const std::array<int, 2>& direction) {
-    const float rim = frame.q.at(x, y), scale = frame.space.axis.relativeScale(rim);
+    const float rim = frame.q.at(x, y), scale = shareScale(frame, rim);
     float before = rim, slope = 0;
     for (int i = 1; i <= kSlopePixels; ++i) {
         const int nx = x + direction[0] * i, ny = y + direction[1] * i;
@@ -179,7 +192,7 @@ std::size_t rimsAround(const OpenFrame& frame, const Image<std::uint8_t>& distan
 /// the mean of the rims, most of those that continue.
 FilledPixel continued(const OpenFrame& frame, std::span<const LocalSource> sources, int x, int y,
                       float hidden, std::span<Rim> rims) {
-    const float foreground = hidden + kForeground * frame.space.axis.relativeScale(hidden);
+    const float foreground = hidden + kForeground * shareScale(frame, hidden);
     const Rim* nearest = nullptr;
     for (Rim& rim : rims) {
         rim.continues =
@@ -228,7 +241,7 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int wides
                     nearest = std::max(nearest, rim.hit.q);
                     farthest = std::min(farthest, rim.hit.q);
                 }
-                const float scale = frame.space.axis.relativeScale(nearest);
+                const float scale = shareScale(frame, nearest);
                 const float hidden =
                     hiddenDepth(sources, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f,
                                 nearest + kInFront * scale,
