@@ -191,7 +191,8 @@ class SequenceWriter {
         } else {
             STX_CHECK(forEachView(
                 table, {"reading", 0}, job,
-                [&](std::size_t k, std::shared_ptr<const ReferenceView> view) -> Result<void> {
+                [&](std::size_t k,
+                    const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
                     if (!about.bounds) bounds[k] = view->computeBounds();
                     if (!hasAlpha()) lookAtUnknown(*view, ranges[k].unknown);
                     return look(k, *view, view->hasSplats() ? longestSplatOf(*view) : 0);
@@ -343,7 +344,7 @@ class SequenceWriter {
         };
         return forEachView(
             table, vectors ? peak::kMpeg4Vectors : peak::kMpeg4, job,
-            [&](std::size_t k, std::shared_ptr<const ReferenceView> view) {
+            [&](std::size_t k, const std::shared_ptr<const ReferenceView>& view) {
                 return placed(code(k, *view), k);
             },
             [&](std::size_t k) {
