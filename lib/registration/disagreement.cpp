@@ -23,7 +23,7 @@ constexpr std::size_t kFewestPoints = 30;
 /// sideways by 2 % of the distance, 16 of 24 come to more than 0.25, 4 to less, and in 4 no views
 /// overlap. Or what surfaces bend by between pixels, if that is more, in all but a quarter of the
 /// points: bars three pixels thick have 0.3 to 1.6 %. Of 40 moved cameras 21 are found with it and
-/// without; on leaves one moved by 0.2 % is no longer.
+/// without; on leaves, one moved by 0.2 % is not found any more.
 constexpr double kSameShare = 0.002, kSameOfPixel = 0.25;
 
 /// A pixel's width and half a step of the depth code, shares of the distance.
