@@ -250,6 +250,8 @@ struct Picture {
 class PicturePair {
   public:
     PicturePair(const Picture& a, const Picture& b);
+    PicturePair(const PicturePair&) = delete;  // it may point to what it holds
+    PicturePair& operator=(const PicturePair&) = delete;
     [[nodiscard]] const RgbaFloatImage* first() const { return first_; }
     [[nodiscard]] const RgbaFloatImage* second() const { return second_; }
 

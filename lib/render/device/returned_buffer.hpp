@@ -52,8 +52,8 @@ struct ReturnedBuffer {
         glFlush();
     }
     /// Until it has arrived; does nothing when it has. Wanted before the next picture is drawn,
-    /// too: NVIDIA's driver (580.159) clears buffers out of order while shaders run, so that
-    /// pictures under way at once lose theirs.
+    /// too: on an NVIDIA H200 (driver 580.159) what was begun while another was under way came
+    /// out empty, until a glFinish() came between. Memory barriers did not help; why is not known.
     [[nodiscard]] Result<void> wait(const EglContext& context) { return waitFor(done, context); }
 };
 

@@ -58,7 +58,7 @@ TEST(PhotoDepth, ARangeIsOfTheNearestAndTheFarthestCode) {
     }
 }
 
-/// All codes alike: there is no nearest one, so the range is of all that the bits hold.
+/// All codes alike: none is nearest, so the range is of all that the bits hold.
 TEST(PhotoDepth, OneCodeIsSomewhereInTheRange) {
     GreyBeside photo(8);
     writeCodes(photo.folder / "a_depth.png", 96, 64, 8, [](int, int) { return 100; });
