@@ -7,6 +7,7 @@
 #include <glm/gtx/quaternion.hpp>
 
 #include "lib/base/parallel.hpp"
+#include "lib/capture/capture.hpp"
 #include "lib/geometry/depth_code.hpp"
 #include "lib/model/texture.hpp"
 #include "lib/splats/draw.hpp"
@@ -237,6 +238,35 @@ TEST(DrawSplats, WhatIsBehindOrAroundTheCameraIsNotDrawn) {
         const auto drawn = drawSplats(cloud, camera, false, job);
         ASSERT_TRUE(drawn);
         for (const glm::vec4 c : drawn->colour.pixels()) EXPECT_EQ(c.w, 0.0f);
+    }
+}
+
+TEST(CaptureOfSplats, SaysWhatIsTooFaintForDepth) {
+    // A square of 20x20 splats that leave no gap, and the same half seen through.
+    for (const float opacity : {0.1f, 1.0f}) {
+        SplatCloud cloud;
+        ASSERT_TRUE(cloud.resize(400, 0, Limits()));
+        Mesh mesh;
+        for (std::size_t i = 0; i < 400; ++i) {
+            mesh.positions.emplace_back(0.1f * static_cast<float>(i % 20) - 0.95f,
+                                        0.1f * static_cast<float>(i / 20) - 0.95f, 0.0f);
+            mesh.points.push_back(static_cast<std::uint32_t>(i));
+            cloud.rotations[i] = glm::vec4(0, 0, 0, 1);
+            cloud.scales[i] = glm::vec3(0.07f);
+            cloud.opacities[i] = i % 20 < 10 ? opacity : 1.0f;
+            cloud.colours[i] = glm::vec3(0.5f);
+        }
+        cloud.positions = mesh.positions;
+        mesh.splats = std::make_shared<const SplatCloud>(std::move(cloud));
+        Job job;
+        ASSERT_TRUE(captureBundle(mesh, {cameraFrom({0, 0, 3}, 64, 64)}, {}, job));
+        const auto notes = job.takeNotes();
+        if (opacity == 1.0f) {
+            EXPECT_TRUE(notes.empty());
+            continue;
+        }
+        ASSERT_EQ(notes.size(), 1u);
+        EXPECT_NE(notes[0].find("has no depth"), std::string::npos);
     }
 }
 
