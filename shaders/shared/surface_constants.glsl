@@ -125,3 +125,10 @@ CONSTANT float kOwn = 0.15f;
 // counts up to kSteepestTap; predictions go no further than kFarthestTap.
 CONSTANT float kOnSurface = 0.003f, kOnSlope = 0.5f;
 CONSTANT float kSteepestTap = 0.02f, kFarthestTap = 0.04f;
+
+// Adding up the pieces of a pixel.
+// The depth of a pixel is that of the piece with the largest share of it, among equal ones of that nearest to its
+// centre: a square pixel of distance counts as kOffCentre of a share, which is less than one sample of 16, halved.
+// Ranks within kSameRank differ by rounding. A steep plane that is a piece for each row of samples was up to 0.38
+// pixels of slope off with the first of them, and is 0.25.
+CONSTANT float kOffCentre = 0.01f, kSameRank = 1e-5f;

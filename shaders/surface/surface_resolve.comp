@@ -20,8 +20,10 @@ void main() {
         uint k = n < range.y ? range.x + n : range.z + (n - range.y);
         float share = pieces[k].share;
         sum += vec4(pieceColours[k].rgb, 1.0) * share;
-        if (share > most) {
-            most = share;
+        vec2 off = fract(vec2(pieces[k].x, pieces[k].y)) - 0.5;
+        float rank = share - kOffCentre * dot(off, off);
+        if (rank > most + kSameRank) {
+            most = rank;
             q = pieces[k].q;
             main_ = k;
         }

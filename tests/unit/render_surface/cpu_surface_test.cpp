@@ -205,6 +205,37 @@ TEST(CpuSurface, ViewsFadeWhenOthersTakeTheirPlace) {
     }
 }
 
+// Rows of samples of a steep plane are pieces of their own: the first gave a depth 0.38 pixels
+// aside.
+TEST(CpuSurface, DepthOfASteepPlaneIsThatAtThePixelsCentre) {
+    const Scene floor = [](glm::dvec3 from, glm::dvec3 along) {
+        return plane(
+            0, [](double x, double y) { return std::abs(x) < 1 && std::abs(y) < 1; }, from, along);
+    };
+    const Bundle bundle =
+        bundleOf(floor, {at({2, 0, 1.2}), at({1, 1.7, 1.2}), at({-1, 1.7, 1.2}), at({0, 0.1, 3})});
+    const Camera novel = at({2.2, 0.9, 0.55}, {0, 0, 0}, 200);
+    const Frame frame = draw(bundle, novel);
+    const auto truth = [&](double x, double y) {
+        const Ray r = rayOf(novel, x, y);
+        const auto hit = floor(r.from, r.along);
+        return hit ? hit->t * glm::dot(r.along, novel.forward()) : 0.0;
+    };
+    int seen = 0;
+    for (int y = 0; y < novel.height; ++y) {
+        for (int x = 0; x < novel.width; ++x) {
+            const double across = std::abs(truth(x + 1, y + 0.5) - truth(x, y + 0.5));
+            const double down = std::abs(truth(x + 0.5, y + 1) - truth(x + 0.5, y));
+            if (frame.colour.at(x, y).a < 0.999f || across + down > 1) continue;
+            ++seen;
+            EXPECT_NEAR(frame.depth.at(x, y), truth(x + 0.5, y + 0.5),
+                        0.26 * (across + down) + 1e-4)
+                << x << ", " << y;
+        }
+    }
+    EXPECT_GT(seen, 2000);
+}
+
 TEST(CpuSurface, MapsBetweenBothProjections) {
     const std::vector<Camera> flat = {orthographicAt({0, 0, 3}, 2.4),
                                       orthographicAt({1, 0.5, 2.8}, 2.4),

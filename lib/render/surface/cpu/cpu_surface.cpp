@@ -211,16 +211,19 @@ class GroupDrawer {
     }
 
     /// Adds the colours of the pieces, each by its share of the pixel. The depth and the origin of
-    /// a pixel are those of its largest piece.
+    /// a pixel are those of its main piece.
     void addPiecesTo(DrawnFrame& out) const {
         const int tileX = frame_->tiles.x(tile_), tileY = frame_->tiles.y(tile_);
-        std::array<float, kTile * kTile> mainShare{};
+        std::array<float, kTile * kTile> mainRank{};
         for (std::size_t i = 0; i < pieces_.size(); ++i) {
             const int x = tileX + pieces_.pixel[i] % kTile, y = tileY + pieces_.pixel[i] / kTile;
             out.colour.at(x, y) += glm::vec4(colours_[i], 1.0f) * pieces_.share[i];
-            float& most = mainShare[pieces_.pixel[i]];
-            if (!(pieces_.share[i] > most)) continue;
-            most = pieces_.share[i];
+            float& most = mainRank[pieces_.pixel[i]];
+            const float dx = pieces_.x[i] - (static_cast<float>(x) + 0.5f);
+            const float dy = pieces_.y[i] - (static_cast<float>(y) + 0.5f);
+            const float rank = pieces_.share[i] - kOffCentre * (dx * dx + dy * dy);
+            if (!(rank > most + kSameRank)) continue;
+            most = rank;
             out.q.at(x, y) = pieces_.q[i];
             if (out.origin.empty() || best_[i] < 0) continue;
             const auto k = static_cast<std::size_t>(best_[i]);
