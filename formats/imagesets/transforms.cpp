@@ -145,13 +145,18 @@ Result<void> setPose(const Json& frame, const std::string& where, SetView& view,
 }
 
 /// When, and by which camera: `time` in seconds, else `frame` by the file's `fps`; `camera`.
-Result<void> setTime(const Json& file, const Json& frame, const std::string& where, SetView& view) {
+Result<void> setTime(const Json& file, const Json& frame, const std::string& where, SetView& view,
+                     Job& job) {
     STX_TRY(view.time, findNumber(frame, "time", where));
     STX_TRY(const auto rate, findNumber(file, "fps", where));
     STX_TRY(const auto number, findNumber(frame, "frame", where));
     if (rate && !(*rate > 0))
         return failAt(where, ErrorCode::invalidInput, "'fps' is {:g}; it must be above 0", *rate);
     if (!view.time && number && rate) view.time = *number / *rate;
+    if (!view.time && number && *number != 0 && !rate)
+        job.note(
+            "a frame has a number ('frame') without a clock ('fps'): all frames are taken as views "
+            "of one moment; add \"fps\": N where they are a film");
     if (const auto it = frame.find("camera"); it != frame.end()) {
         if (it->is_string())
             view.taker = it->get<std::string>();
@@ -235,7 +240,7 @@ Result<std::vector<SetView>> transformsViews(const Json& file, Job& job) {
         view.name = name ? nameOfFrame(*name) : fmt::format("frame{:03}", i);
         STX_CHECK(setPose(frame, where, view, job));
         STX_CHECK(readOwnKeys(frame, where, view));
-        STX_CHECK(setTime(file, frame, where, view));
+        STX_CHECK(setTime(file, frame, where, view, job));
         if (!view.exactName.empty()) view.name = view.exactName;
         if (view.camera.width > 0)
             if (auto ok = view.camera.check(); !ok) return tl::unexpected(ok.error().at(where));
