@@ -124,8 +124,8 @@ bool anyPoint(const Image<float>& depth) {
                        [](float d) { return hasPoint(d); });
 }
 
-/// Takes away what a mask does not show: its grey is the share of a pixel that belongs to the
-/// object.
+/// Takes away what a mask does not show: its grey, and its alpha where it has one, is the share of a
+/// pixel that belongs to the object.
 Result<void> applyMask(const SetView& set, const std::filesystem::path& file, StoredView& stored,
                        Job& job) {
     const std::string name = file.string(), where = fmt::format("'{}'", name);
@@ -137,7 +137,7 @@ Result<void> applyMask(const SetView& set, const std::filesystem::path& file, St
                       mask.width(), mask.height(), set.texture.name, stored.texture.width(),
                       stored.texture.height());
     for (std::size_t i = 0; i < mask.count(); ++i) {
-        const int share = mask.data()[i].r;
+        const int share = (mask.data()[i].r * mask.data()[i].a + 127) / 255;
         if (auto* coded = stored.texture.rgba8()) {
             auto& alpha = coded->data()[i].a;
             const int own = stored.alpha ? alpha : 255;

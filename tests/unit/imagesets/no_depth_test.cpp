@@ -173,6 +173,18 @@ TEST(NoDepth, MasksOfTheSetAreRead) {
     EXPECT_EQ(view.texture.at(55, 30).a, 0.0f);
     EXPECT_TRUE(hasPoint(view.depth.at(65, 30)));
 
+    // White everywhere, and cut out by alpha.
+    std::vector<std::uint8_t> white(std::size_t{4} * kWidth * kHeight, 255);
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < 60; ++x) white[std::size_t{4} * (y * kWidth + x) + 3] = 0;
+    const auto png = encodePng(kWidth, kHeight, 4, 8, white.data(), true);
+    ASSERT_TRUE(png);
+    writeBytes(folder / "masks/m.png", *png);
+    const auto cut = readSet(folder.path());
+    ASSERT_TRUE(cut) << cut.error().text();
+    EXPECT_TRUE(cut->views[0].depth == view.depth);
+    EXPECT_EQ(cut->views[0].texture.at(55, 30).a, 0.0f);
+
     // One that is named and not there is a missing file like others.
     std::filesystem::remove(folder / "masks/m.png");
     ImageSetOptions strict;
