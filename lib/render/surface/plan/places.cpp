@@ -113,9 +113,29 @@ class PlacesOf {
     void visitBlock(int number, double apart, const Visit& visit) const {
         const Source& s = source_;
         const int x0 = number % s.blocksX * kBlock, y0 = number / s.blocksX * kBlock;
-        const int step = pixelsApart(s.blocks[static_cast<std::size_t>(number)], x0, y0, apart);
+        int step = pixelsApart(s.blocks[static_cast<std::size_t>(number)], x0, y0, apart);
         BlockBuffer buffer;
         const BlockTexels texels = blockTexels(s, x0, y0, buffer);
+        if (step > 1) {
+            // Pixels of a surface that the source sees at a low angle are much farther apart in a
+            // frame from aside than those of one that faces it.
+            float most = 0;
+            visitPixels(texels, x0, y0, step, [&](glm::vec3 at, float w, glm::vec2 slope) {
+                const glm::vec3 a = stepOf(0, slope.x, at, w), b = stepOf(1, slope.y, at, w);
+                most = std::max({most, std::abs(a.x), std::abs(a.y), std::abs(b.x), std::abs(b.y)});
+            });
+            while (step > 1 && step * most > 2 * apart) step /= 2;
+        }
+        visitPixels(texels, x0, y0, step, [&](glm::vec3 at, float w, glm::vec2 slope) {
+            visit(at.x, at.y, at.z, [&] { return riseOf(slope, at, w); });
+        });
+    }
+    /// Calls visit(at, w, slope) for those pixels of a block, `step` apart, that face the camera
+    /// and are in the frame: `at` there, with this w, and the slope of q in the source.
+    template <class Visit>
+    void visitPixels(const BlockTexels& texels, int x0, int y0, int step,
+                     const Visit& visit) const {
+        const Source& s = source_;
         const int columns = std::min(kBlock, s.width - x0), rows = std::min(kBlock, s.height - y0);
         // Blocks at the border of a picture may have fewer pixels than a step.
         for (int j = std::min(step, rows) / 2; j < rows; j += step) {
@@ -137,7 +157,7 @@ class PlacesOf {
                 if (slope.x * (eye_.x - u * eye_.w) + slope.y * (eye_.y - v * eye_.w) >
                     eye_.z - q * eye_.w)
                     continue;
-                visit(at.x, at.y, at.z, [&] { return riseOf(slope, at, h.w); });
+                visit(at, h.w, slope);
             }
         }
     }
