@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
@@ -9,6 +10,7 @@
 #include "formats/imagesets/resample.hpp"
 #include "formats/imagesets/set_view.hpp"
 #include "lib/base/cpu_clock.hpp"
+#include "lib/base/median.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/refine/align.hpp"
 #include "lib/refine/gaps.hpp"
@@ -124,8 +126,8 @@ bool anyPoint(const Image<float>& depth) {
                        [](float d) { return hasPoint(d); });
 }
 
-/// Takes away what a mask does not show: its grey, and its alpha where it has one, is the share of a
-/// pixel that belongs to the object.
+/// Takes away what a mask does not show: its grey, and its alpha where it has one, is the share of
+/// a pixel that belongs to the object.
 Result<void> applyMask(const SetView& set, const std::filesystem::path& file, StoredView& stored,
                        Job& job) {
     const std::string name = file.string(), where = fmt::format("'{}'", name);
@@ -288,6 +290,27 @@ Result<void> shiftTogether(const SetView& set, const ImageSetOptions& options, C
     return {};
 }
 
+/// Stairs of depth codes are smoothed where one step, as a share of the distance, is larger. Of 15
+/// pictures from six views of a room or of what is in it, with 10 bits and steps of 0.5 to 2 % or
+/// 12 bits and 0.4 %, the mean is 1.8 dB better and one 11 dB; with steps of 0.2 % three are 0.1 dB
+/// worse. Codes of 8 bits always are: 1.2 dB better.
+constexpr float kCoarseStep = 0.003f;
+/// Codes of more bits are finer.
+constexpr int kMostCoarseBits = 12;
+
+/// The share of the distance that a step of the codes is: the median of neighbours that are one
+/// step apart, 0 where few are.
+float stepShare(const Image<float>& codes, const Image<float>& distances) {
+    constexpr std::size_t kFewestSteps = 30;
+    std::vector<float> shares;
+    for (std::size_t i = 1; i < codes.count(); ++i) {
+        const float was = distances.data()[i - 1], is = distances.data()[i];
+        if (std::abs(codes.data()[i] - codes.data()[i - 1]) == 1 && hasPoint(was) && hasPoint(is))
+            shares.push_back(std::abs(is - was) / std::min(is, was));
+    }
+    return shares.size() < kFewestSteps ? 0.0f : medianOf(std::move(shares));
+}
+
 /// Makes distances of the stored values, and smooths the stairs of coarse ones. `noDepth`: what
 /// pixels without one are; those of nothing are made transparent. The camera's rows may move, too
 /// (shiftTogether()).
@@ -295,13 +318,18 @@ Result<void> toDistances(const SetView& set, const ImageSetOptions& options, Cam
                          StoredView& stored, NoDepth& noDepth, RefineReport& report, Job& job) {
     const int bits = stored.depthBits;
     // What we exported ourselves comes back as it was.
-    const bool smooth = set.distances && bits < 32 &&
-                        options.refine.atImport(RefineStep::steps, bits == 8 && !set.planes);
-    Image<float> codes = smooth ? stored.depth : Image<float>();
+    const bool mayBeCoarse = bits <= kMostCoarseBits && !set.planes;
+    const bool maySmooth =
+        set.distances && bits < 32 && options.refine.atImport(RefineStep::steps, mayBeCoarse);
+    Image<float> codes = maySmooth ? stored.depth : Image<float>();
     if (set.distances) STX_CHECK(set.distances(stored.depth, camera, bits, job));
     noDepth = noDepthOf(set, options, stored);
     dropImpossible(stored.depth);
-    if (!smooth) return {};
+    if (!maySmooth ||
+        !options.refine.atImport(
+            RefineStep::steps,
+            mayBeCoarse && (bits <= 8 || stepShare(codes, stored.depth) > kCoarseStep)))
+        return {};
 
     std::optional<StepOfView> step(std::in_place, report, RefineStep::steps);
     for (std::size_t i = 0; i < codes.count(); ++i)

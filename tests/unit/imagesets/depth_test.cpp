@@ -100,4 +100,39 @@ TEST(Depth, StairsOf8BitsAreSmoothedWithinHalfAStep) {
     EXPECT_LT(error[1], error[0] / 9);  // rms a third
 }
 
+/// Finer codes are smoothed where a step is more than 0.3 % of the distance: here 0.6 and 0.15 %.
+TEST(Depth, StairsOf10BitsAreSmoothedWhereTheyAreCoarse) {
+    for (const int least : {100, 600}) {
+        const TemporaryFolder folder;
+        const auto code = [&](int x, int y) { return least + 0.11 * x + 0.04 * y; };
+        std::string texture(96 * 64 * 3 / 2, char(100)), depth;
+        const auto add = [&](long value) {
+            depth += static_cast<char>(value & 255);
+            depth += static_cast<char>(value >> 8);
+        };
+        for (int y = 0; y < 64; ++y)
+            for (int x = 0; x < 96; ++x) add(std::lround(code(x, y)));
+        for (int i = 0; i < 96 * 64 / 2; ++i) add(512);
+        writeText(folder / "a_texture_96x64_yuv420p.yuv", texture);
+        writeText(folder / "a_depth_96x64_yuv420p10le.yuv", depth);
+        writeText(folder / "list.json", mivJson(96, 64, "[1,20]"));
+        ImageSetOptions options;
+        options.depthBits = 32;
+        Job job;
+        const auto read = readImageSet(folder.path(), options, job);
+        ASSERT_TRUE(read) << read.error().text();
+        double error = 0;
+        for (int y = 0; y < 64; ++y)
+            for (int x = 0; x < 96; ++x) {
+                const double s = (20 / static_cast<double>(read->views[0].depth.at(x, y)) - 1) / 19;
+                error += std::pow(s * 1023 - code(x, y), 2) / (96 * 64);
+            }
+        // Rounding to whole codes is off by a twelfth.
+        if (least == 100)
+            EXPECT_LT(error, 1.0 / 12 / 9);
+        else
+            EXPECT_NEAR(error, 1.0 / 12, 0.01);
+    }
+}
+
 }  // namespace
