@@ -20,10 +20,10 @@ namespace {
 constexpr double kPoints = 600, kPointsOfLeaves = 5000, kRankPoints = 40;
 /// With fewer points inside of surfaces (leaves, hair) single pixels are compared.
 constexpr std::size_t kFewInside = 60;
-/// In views of fewer pixels, each is so large a part of what is shown that single ones differ by
-/// where they sample. A ball in exact views of 19x16 was taken for lit otherwise, 2.4 times as
-/// clearly as is asked for; of 29 other such cases of tests/sweep the clearest has 0.7 of that, of
-/// 29 with larger views 0.43.
+/// Views of fewer pixels are left alone: each pixel is so large a part of what is shown that
+/// colours differ by where it samples. A ball in exact views of 19x16 was taken for lit otherwise,
+/// 2.4 times as clearly as is asked for, and a room in such of 19x14; of 29 cases of tests/sweep
+/// with larger views the clearest has 0.43.
 constexpr std::int64_t kFewPixels = 1000;
 /// Views that a view is compared with: those that show most of it.
 constexpr std::size_t kComparedWith = 8;
@@ -293,12 +293,13 @@ Result<std::optional<std::vector<ColourMap>>> mapsOf(std::span<const Camera> cam
                                                      bool keeps, const ColourPoints* known) {
     STX_TRY(auto pairs, SharedColoursFinder(cameras, partOf, each, 1, keeps, known).find());
     if (!pairs) return std::nullopt;
-    std::size_t most = 0;
-    for (const SharedColours& pair : *pairs) most = std::max(most, pair.points.size());
     const bool small = std::ranges::all_of(cameras, [](const Camera& c) {
         return static_cast<std::int64_t>(c.width) * c.height < kFewPixels;
     });
-    if (most < kFewInside && !small) {
+    if (small) return matchColours(cameras.size(), {});
+    std::size_t most = 0;
+    for (const SharedColours& pair : *pairs) most = std::max(most, pair.points.size());
+    if (most < kFewInside) {
         STX_TRY(pairs, SharedColoursFinder(cameras, partOf, each, 0, keeps).find());
         if (!pairs) return std::nullopt;
     }

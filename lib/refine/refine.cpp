@@ -22,7 +22,7 @@ constexpr const char* kFound = "where it is found";
 
 // clang-format off
 constexpr std::array<RefineStepInfo, kRefineSteps> kSteps{{
-    {steps, "steps", kImport, known, "8-bit depth",
+    {steps, "steps", kImport, known, "8-bit depth, and up to 12 bits where codes are coarse",
      "stairs of depth in coarse codes are smoothed within half a step", ""},
     {shift, "shift", kImport, known, "Middlebury 2003 to 2006",
      "disparities and rows that are a part of a pixel off move to where other pictures of the set show them", ""},
