@@ -65,43 +65,61 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
     Facet facet = facetOf(self, x, y, q);
     int votes = 0, enough = kWholeVote * (nearEdge ? kVotesNearEdge : kVotesElsewhere);
     uint others = 0u;  // do not show it
+    uint guesses = 0u;  // show it by an extension
     uint closelyBehind = 0u;  // show something there, and not by an extension
     bool guess = (flags & kExtensionBit) != 0u;
     bool outermost = guess && beyondCentres(self, x, y, q);
     float within = sameWithin(q), close = kLinkedSamples * relativeScale(frameAxis(), q);
-    // First those that show it, then the others until it is decided: in one loop, see voteOf().
-    int count = int(tile.count);
-    for (int n = 0; n < 2 * count; ++n) {
-        bool first = n < count;
-        int k = first ? n : n - count;
-        if (first) {
-            if (k == own) continue;
+    // Four at a time: llvmpipe ends all loops of a thread together after 65535 rounds.
+    for (int n = 0; n < int(tile.count); n += 4) {
+        for (int m = 0; m < 4; ++m) {
+            int k = n + m;
+            if (k == own || k >= int(tile.count)) continue;
             uint value = sampleOf(k, i, j);
             float apart = q - uintBitsToFloat(value);
+            bool extension = (value & kExtensionBit) != 0u;
             if (value == 0u || !(abs(apart) < within)) {
                 others |= 1u << k;
-                if ((value & kExtensionBit) == 0u && apart > 0.0f && apart < close) closelyBehind |= 1u << k;
-                continue;
-            }
-            if ((value & kExtensionBit) == 0u) {
+                if (!extension && apart > 0.0f && apart < close) closelyBehind |= 1u << k;
+            } else if (extension) {
+                guesses |= 1u << k;
+            } else {
                 enough += kWholeVote;
                 guess = false;
-                continue;
             }
-            // The rims of thin parts are extensions in all sources, which show them where they do not see
-            // past them. Extensions inside the object are guesses, which support nothing.
-        } else {
-            if (!(votes < enough)) break;
-            if ((others >> k & 1u) == 0u) continue;
         }
-        int vote = voteOf(sourceOf(k), x, y, q, facet);
+    }
+    // The rims of thin parts are extensions in all sources, which show them where they do not see past them.
+    // Extensions inside the object are guesses, which support nothing. Then the others vote until it is decided. In
+    // one loop, in which a source that votes twice (see seesEdgeOn()) comes twice: drivers put every call of a
+    // function in its place, and voteAt() twice takes one 20 s to compile.
+    bool first = guesses != 0u, again = false;
+    uint left = first ? guesses : others;
+    int before = kNoVote;
+    vec4 h;
+    while (left != 0u && (first || votes < enough)) {
+        int k = findLSB(left), s = sourceOf(k);
+        if (!again) h = warp(s, x, y, q);
+        bool outline;
+        int vote = voteAt(s, h, outline);
+        if (!again && vote != kNoVote && outline && seesEdgeOn(s, facet, h)) {
+            before = vote;
+            h = behindFacet(s, facet, h);
+            again = true;
+            continue;
+        }
+        if (again) vote = min(vote, before);
+        again = false;
         votes += vote;
-        if (vote != kNoVote) continue;
-        if (first)
-            enough += silhouette ? kWholeVote : 0;
-        else if (guess && (closelyBehind >> k & 1u) != 0u && facet.any &&
-                 (outermost || sizeIn(sourceOf(k), facet, warp(sourceOf(k), x, y, q)) > kSeesBetter))
+        left &= left - 1u;
+        if (vote == kNoVote && first) enough += silhouette ? kWholeVote : 0;
+        if (vote == kNoVote && !first && guess && (closelyBehind >> k & 1u) != 0u && facet.any &&
+            (outermost || sizeIn(s, facet, warp(s, x, y, q)) > kSeesBetter))
             return true;
+        if (left == 0u && first) {
+            first = false;
+            left = others;
+        }
     }
     return votes >= enough;
 }

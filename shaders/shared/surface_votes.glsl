@@ -209,22 +209,7 @@ int voteOnOutline(int s, IN(Facet) facet, float x, float y, float q, int vote) {
     return seesEdgeOn(s, facet, h) ? min(vote, voteAt(s, behindFacet(s, facet, h), outline)) : vote;
 }
 
-// The vote of a source on the point (x, y, q) of the frame, which is of this facet. A loop, since drivers put
-// every call of a function in its place: voteAt() twice, here and wherever this is called, takes one 20 s to compile.
-int voteOf(int s, float x, float y, float q, IN(Facet) facet) {
-    vec4 h = warp(s, x, y, q);
-    int vote = kTwoVotes;
-    bool again = true;
-    for (bool behind = false; again; behind = true) {
-        bool outline;
-        vote = min(vote, voteAt(s, h, outline));
-        again = !behind && vote != kNoVote && outline && seesEdgeOn(s, facet, h);
-        if (again) h = behindFacet(s, facet, h);
-    }
-    return vote;
-}
-
-// The same of a point of which nobody shows a surface.
+// The vote of a source on the point (x, y, q) of the frame, of which nobody shows a surface.
 int voteOf(int s, float x, float y, float q) {
     bool outline;
     return voteAt(s, warp(s, x, y, q), outline);

@@ -454,7 +454,8 @@ struct Facets {
     }
 };
 
-/// voteOf() of source `s` on the points of `wanted`, 0 on others.
+/// The votes of source `s` on the points of `wanted` as rejected() of shaders/shared asks for them,
+/// 0 on others.
 HWY_INLINE Counts votesOf(shared::Votes& votes, const VotingSource& from, int s,
                           const FramePoints& points, Facets& facets, PointMask wanted) {
     const PointTag d;

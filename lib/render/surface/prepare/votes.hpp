@@ -97,8 +97,7 @@ struct SourcePixels {
     [[nodiscard]] static float qPerUnit(Axis axis, float q) { return axis.qPerUnit(q); }
 };
 
-/// Free-space votes: voteOf(source, x, y, q, facet) is kNoVote, kHalfVote, kWholeVote or
-/// kTwoVotes.
+/// Free-space votes: voteOf(source, x, y, q) is kNoVote, kHalfVote, kWholeVote or kTwoVotes.
 struct Votes : SourcePixels {
 #include "shaders/shared/surface_votes.glsl"
 };
