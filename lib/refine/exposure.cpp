@@ -64,7 +64,7 @@ class Samples {
                 };
                 const glm::dvec3 world = worldAt(x, y);
                 glm::dvec3 normal = towards(c, world);
-                if (radius_ > 0)
+                if (radius_ > 0 || isAmid(view, x, y, depth))
                     normal = glm::normalize(glm::cross(worldAt(x + 1, y) - worldAt(x - 1, y),
                                                        worldAt(x, y - 1) - worldAt(x, y + 1)));
                 points.push_back({world, normal, *colour});
@@ -93,6 +93,17 @@ class Samples {
     [[nodiscard]] float depthAt(std::size_t view, int x, int y) const {
         const PixelPart part = partOf_(view, x, y, x, y);
         return part.texture ? part.depth->data()[part.texel(x, y)] : kNoDepth;
+    }
+    /// Whether the pixels beside one are on its surface: where they are, the other side of a thin
+    /// plate can be told from it.
+    [[nodiscard]] bool isAmid(std::size_t view, int x, int y, float depth) const {
+        const Camera& c = cameras_[view];
+        const auto isAt = [&](int i, int j) {
+            if (i < 0 || j < 0 || i >= c.width || j >= c.height) return false;
+            const float there = depthAt(view, i, j);
+            return hasPoint(there) && std::abs(there - depth) < 2 * kSamePlace * depth;
+        };
+        return isAt(x - 1, y) && isAt(x + 1, y) && isAt(x, y - 1) && isAt(x, y + 1);
     }
     [[nodiscard]] std::optional<glm::vec3> colourAt(std::size_t view, int x, int y,
                                                     double depth) const {

@@ -41,7 +41,8 @@ using PartOfView = std::function<PixelPart(std::size_t view, int x0, int y0, int
 /// A point of a view at which colours are compared.
 struct ColourPoint {
     glm::dvec3 world;
-    glm::dvec3 normal;  ///< of the surface; where single pixels are compared: towards their camera
+    glm::dvec3 normal;  ///< of the surface; of single pixels that show no more of one: towards
+                        ///< their camera
     glm::vec3 colour;   ///< stored values, 0..1
 };
 /// Those of each view.
