@@ -287,6 +287,11 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
         photo->format = "picture and depth";
         STX_TRY(depth, besideDepth(beside, options, *photo, job));
         view.depth = depth.source;
+    } else if (options.depthUnit > 0 || options.photo.nearIs != NearIs::unknown) {
+        return failAt(where, ErrorCode::usage,
+                      "its depth is in the file, which says what its codes are; {} is of depth "
+                      "beside a photo",
+                      options.depthUnit > 0 ? "--depth-unit" : "--depth-near");
     }
     STX_CHECK(within(where, setRange(*photo, options, depth, job)));
     photo->code = depth.code;

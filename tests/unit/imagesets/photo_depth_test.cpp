@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "tests/made_photos.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
 using namespace stx;
@@ -91,4 +92,16 @@ TEST(PhotoDepth, OptionsThatDoNotGoTogetherAreRefused) {
     expectError(photo.read(), {"a_depth.exr", "floats", "--depth-unit"});
     photo.options.depthUnit = 0;
     EXPECT_TRUE(photo.read());
+}
+
+TEST(PhotoDepth, OptionsOfDepthBesideAreRefusedWhereTheFileHasIt) {
+    const TemporaryFolder folder;
+    ASSERT_TRUE(writeFile(folder / "a.jpg", made::gdepthPhoto()));
+    EXPECT_TRUE(readSet(folder / "a.jpg"));
+    ImageSetOptions options;
+    options.depthUnit = 0.5;
+    expectError(readSet(folder / "a.jpg", options), {"a.jpg", "--depth-unit", "in the file"});
+    options.depthUnit = 0;
+    options.photo.nearIs = NearIs::white;
+    expectError(readSet(folder / "a.jpg", options), {"a.jpg", "--depth-near", "in the file"});
 }
