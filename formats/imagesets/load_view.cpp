@@ -124,8 +124,8 @@ bool anyPoint(const Image<float>& depth) {
                        [](float d) { return hasPoint(d); });
 }
 
-/// Takes away what a mask does not show: its grey, and its alpha where it has one, is the share of a
-/// pixel that belongs to the object.
+/// Takes away what a mask does not show: its grey, and its alpha where it has one, is the share of
+/// a pixel that belongs to the object.
 Result<void> applyMask(const SetView& set, const std::filesystem::path& file, StoredView& stored,
                        Job& job) {
     const std::string name = file.string(), where = fmt::format("'{}'", name);
