@@ -95,6 +95,13 @@ class WrongInput(Case):
         self.fails("usage", "mode is 3; a text", render, bundle, camera, mode=3)
         self.fails("usage", "no stage 'x'", render, bundle, camera, without=["x"])
         self.fails("usage", "ambient is negative", render, bundle, camera, ambient=-1)
+        for wrong in (np.nan, np.inf, -np.inf, 1e300):
+            for name in ("ambient", "specular"):
+                self.fails("usage", f"{name} is {wrong}; finite", render, bundle, camera, **{name: wrong})
+            frame = render(bundle, camera)
+            self.fails("usage", f"background is {wrong}; finite", frame.picture, background=wrong)
+            self.fails("usage", f"background is {wrong}; finite", frame.save, "a.png", background=wrong)
+            self.fails("usage", f"background is {wrong}; finite", stx.compare, frame, frame, background=wrong)
         self.fails("usage", "shininess is 0", render, bundle, camera, shininess=0)
         self.fails("usage", "no stage 'y'", render, bundle, camera, without="holes,y")
         self.fails("usage", "lights is [3]; a list of stx.Light", render, bundle, camera, lights=[3])

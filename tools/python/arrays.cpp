@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "tools/python/work.hpp"
 
@@ -110,8 +111,12 @@ glm::dvec3 vectorFrom(py::handle value, const char* name) {
 
 glm::vec3 colourFrom(py::handle value, const char* name) {
     const auto numbers = numbersFrom<double>(value, name, "grey or three numbers (r, g, b)");
-    if (numbers.ndim() == 0) return glm::vec3(static_cast<float>(*numbers.data()));
-    return glm::vec3(vectorFrom(value, name));
+    const glm::dvec3 colour =
+        numbers.ndim() == 0 ? glm::dvec3(*numbers.data()) : vectorFrom(value, name);
+    constexpr double kMost = std::numeric_limits<float>::max();
+    if (!glm::all(glm::lessThanEqual(glm::abs(colour), glm::dvec3(kMost))))
+        refuse("{} is {}; finite numbers are expected", name, std::string(py::str(value)));
+    return glm::vec3(colour);
 }
 
 glm::dmat4 poseFrom(py::handle value, const char* name) {
