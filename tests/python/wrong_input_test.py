@@ -55,6 +55,10 @@ class WrongInput(Case):
         linear = colour.astype(np.float32)
         linear[0, 0, 0] = np.nan
         self.fails("usage", "colour holds NaN", stx.View, linear, depth, self.camera)
+        for wrong in (-0.5, 1.5):
+            covered = np.ones((4, 6, 4), np.float32)
+            covered[1, 2, 3] = wrong
+            self.fails("usage", "colour has an alpha of %g; 0 to 1 is expected" % wrong, stx.View, covered, depth, self.camera)
         self.fails("usage", "no_depth is 'none'; empty or unknown", stx.View, colour, depth, self.camera, no_depth="none")
         self.fails("usage", "depthBits is 12", stx.View, colour, depth, self.camera, depth_bits=12)
         one = stx.View(colour, depth, self.camera, name="a")
