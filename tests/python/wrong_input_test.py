@@ -65,6 +65,18 @@ class WrongInput(Case):
         self.fails("usage", "two views have the name 'a'", stx.Bundle, [one, one])
         self.fails("invalidInput", "view", stx.Bundle, [])
 
+    def test_masked_arrays(self):
+        def masked(array):
+            return np.ma.masked_array(array, mask=np.zeros(array.shape, bool))
+
+        colour, depth = np.zeros((4, 6, 3), np.uint8), np.ones((4, 6), np.float32)
+        self.fails("usage", "colour is a masked array; .filled(VALUE)", stx.View, masked(colour), depth, self.camera)
+        self.fails("usage", "depth is a masked array", stx.View, colour, masked(depth), self.camera)
+        self.fails("usage", "normals is a masked array", stx.View, colour, depth, self.camera, normals=masked(np.ones((4, 6, 3))))
+        self.fails("usage", "mask is a masked array", stx.compare, colour, colour, mask=masked(depth > 0))
+        self.fails("usage", "world_from_camera is a masked array", stx.Camera, (6, 4), 5, world_from_camera=masked(np.eye(4)))
+        self.fails("usage", "frames is a masked array", stx.background, masked(np.zeros((8, 24, 32, 3), np.uint8)))
+
     def test_cameras(self):
         pose = np.eye(4)
         for wrong, text in ((np.nan, "not a rotation"), (2.0, "not a rotation")):

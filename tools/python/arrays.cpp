@@ -21,6 +21,7 @@ std::string described(py::handle value) {
 /// Whatever numpy takes for numbers.
 template <class T>
 py::array_t<T> numbersFrom(py::handle value, const char* name, const char* expected) {
+    refuseMasked(value, name);
     const auto array = py::array::ensure(value);
     if (array && std::strchr("iuf", array.dtype().kind()))
         if (auto numbers = py::array_t<T, py::array::c_style | py::array::forcecast>::ensure(array))
@@ -31,6 +32,7 @@ py::array_t<T> numbersFrom(py::handle value, const char* name, const char* expec
 
 /// An array as it is, of one of the kinds of numbers and with these axes; -1: of any length.
 py::array imageFrom(py::handle value, const char* name, bool fits, const char* expected) {
+    refuseMasked(value, name);
     if (!fits) refuse("{} is {}; {} is expected", name, described(value), expected);
     auto array = py::reinterpret_borrow<py::array>(value);
     for (py::ssize_t axis = 0; axis < 2; ++axis)
@@ -74,6 +76,11 @@ Image<glm::vec<4, T>> withAlpha(const py::array& array, T full) {
 }
 
 }  // namespace
+
+void refuseMasked(py::handle value, const char* name) {
+    if (py::isinstance<py::array>(value) && py::hasattr(value, "filled"))
+        refuse("{} is a masked array; .filled(VALUE) of it, which has no mask, is expected", name);
+}
 
 py::array arrayOfMemory(const py::dtype& type, std::vector<py::ssize_t> shape, const void* data,
                         std::shared_ptr<const void> owner) {
