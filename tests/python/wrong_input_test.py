@@ -136,6 +136,8 @@ class WrongInput(Case):
     def test_models(self):
         mesh = stx.open(MODEL)
         self.fails("usage", "'circle:3' is not a view layout", stx.convert, mesh, views="circle:3")
+        self.fails("usage", "'circle:3' is not a view layout", stx.convert, self.bundle, views="circle:3")
+        self.fails("usage", "the views are 'auto:x'", stx.convert, self.bundle, views="auto:x")
         self.fails("usage", "size is 0x5", stx.convert, mesh, size=(0, 5))
         self.fails("usage", "cameras is ['a']; a list of stx.Camera", stx.convert, mesh, cameras=["a"])
         self.fails("usage", "intrinsics is (1, 2); four numbers", stx.open, MODEL, intrinsics=(1, 2))
