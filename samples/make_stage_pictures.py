@@ -55,10 +55,6 @@ def fat(bundle):
     return stx.Bundle([with_depth(v, grown(v.depth)) for v in bundle.views])
 
 
-def missing(bundle, share=0.03):
-    return stx.Bundle([with_depth(v, np.where(RANDOM.random(v.depth.shape) < share, np.inf, v.depth)) for v in bundle.views])
-
-
 def glass(bundle):
     def half(c):
         c = c.copy()
@@ -113,7 +109,7 @@ def captures(folder):
     return {
         "exact": (sphere, around), "few": (stx.convert(model, views="sphere:5", size=size), around), "small": (sphere, small),
         "grid": (noisy(stx.convert(model, views="octahedral:4", size=size)), around), "noisy": (noisy(sphere), around),
-        "exposed": (exposed(stx.convert(model, views="sphere:16", size=(256, 256))), around), "fat": (fat(sphere), around), "missing": (missing(sphere), around),
+        "exposed": (exposed(stx.convert(model, views="sphere:16", size=(256, 256))), around), "fat": (fat(sphere), around),
         "glass": (glass(sphere), around), "room": (room, inside), "unmeasured": (unmeasured(room), inside), "apart": (apart(room), inside),
         "alone": (stx.Bundle([room.views[0]]), inside),
     }

@@ -48,14 +48,15 @@ OptionRow optionRow(const CLI::Option& option) {
     row.many = option.get_items_expected_max() > 1;
     if (option.get_items_expected_max() > 0) {
         const std::string type = option.get_type_name();
+        // What is behind a colon is CLI11's, or a part of the value: A:B[:STEP].
         const auto colon = type.find(':');
-        row.value = type.substr(0, colon);
-        if (row.value == "TEXT") row.value = "WORD";
-        if (row.value == "INT" || row.value == "UINT" || row.value == "FLOAT") row.value = "N";
         if (colon != std::string::npos) {
             row.choices = choicesIn(type.substr(colon));
             if (row.choices.empty()) row.range = rangeIn(type.substr(colon));
         }
+        row.value = row.choices.empty() && row.range.empty() ? type : type.substr(0, colon);
+        if (row.value == "TEXT") row.value = "WORD";
+        if (row.value == "INT" || row.value == "UINT" || row.value == "FLOAT") row.value = "N";
     }
     return row;
 }

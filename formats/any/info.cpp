@@ -508,10 +508,7 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
         case FileKind::numbered:  // described above
         case FileKind::image:
         case FileKind::unknown:
-            return fail(ErrorCode::invalidInput,
-                        "'{}' is neither a mesh, a bundle, an atlas, an image set nor a photograph "
-                        "with depth",
-                        path.string());
+            return tl::unexpected(unknownInput(path));
     }
     STX_CHECK(addMeasured(path, kind, options, open, out, job));
     return out;

@@ -94,6 +94,22 @@ const char* nameOf(FileKind kind) {
     return "an unknown file";
 }
 
+Error unknownInput(const fs::path& path) {
+    // It has neither a name nor files beside it.
+    if (path == "/dev/stdin")
+        return {ErrorCode::invalidInput,
+                "standard input is neither a mesh (GLB, glTF, PLY, DRC, binary FBX, STL as text) "
+                "nor a bundle or an atlas (.mp4, .xmt, .bt, .exr) nor a photograph with depth; "
+                "other meshes, image sets and folders are given by name",
+                {}};
+    return {ErrorCode::invalidInput,
+            fmt::format("'{}' is neither a mesh (glTF, GLB, OBJ, PLY, STL, OFF, DAE, FBX, DRC, "
+                        "SPZ) nor a bundle (.mp4, .xmt, .bt, .exr) nor an atlas nor an image set "
+                        "nor a photograph with depth",
+                        path.string()),
+            {}};
+}
+
 Result<FileKind> recognise(const fs::path& path) {
     std::error_code ec;
     const auto status = fs::status(path, ec);
@@ -222,13 +238,7 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
         }
         case FileKind::image:
         case FileKind::unknown:
-            return fail(
-                ErrorCode::invalidInput,
-                "'{}' is neither a mesh (glTF, GLB, OBJ, PLY, STL, OFF, DAE, FBX, DRC, SPZ) nor "
-                "a bundle "
-                "(.mp4, .xmt, .bt, .exr) "
-                "nor an atlas nor an image set nor a photograph with depth",
-                path.string());
+            return tl::unexpected(unknownInput(path));
     }
     if (!bundle) return propagate(bundle);
     // Every reader checks what it returns: see Bundle::check().

@@ -30,6 +30,9 @@ enum class FileKind {
 [[nodiscard]] Result<FileKind> recognise(const std::filesystem::path& path);
 /// "a mesh", "an MPEG-4 file" …
 [[nodiscard]] const char* nameOf(FileKind kind);
+/// Of what is nothing that can be opened (invalidInput): says what can be, of standard input what
+/// is known by its content alone.
+[[nodiscard]] Error unknownInput(const std::filesystem::path& path);
 
 /// Errors (usage): the options name an object, and what is opened is not an atlas.
 [[nodiscard]] Result<void> checkObject(const std::filesystem::path& path, FileKind kind,

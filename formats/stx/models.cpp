@@ -71,6 +71,9 @@ Result<Bundle> convert(Model model, const ConvertSettings& settings, Job& job) {
         *settings.depthBits != 32)
         return fail(ErrorCode::usage, "depthBits is {}; 8, 16 or 32 is possible",
                     *settings.depthBits);
+    // Wrong of any model, though what is not a mesh has views already.
+    STX_TRY(const auto best, parseAutoViews(settings.views));
+    if (!best) STX_CHECK(parseViewLayout(settings.views));
     Result<Bundle> bundle = Bundle();
     if (const auto* mesh = std::get_if<Mesh>(&model)) {
         STX_CHECK(mesh->check());

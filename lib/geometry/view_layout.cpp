@@ -36,7 +36,7 @@ Result<ViewLayout> parseViewLayout(std::string_view text) {
     else
         return fail(ErrorCode::usage,
                     "'{}' is not a view layout; use cube, ring:N, sphere:N, octahedral:N, "
-                    "hemi-octahedral:N or a camera file",
+                    "hemi-octahedral:N, auto:N, auto:DBdB or a camera file",
                     text);
     const auto digits =
         colon == std::string_view::npos ? std::string_view() : text.substr(colon + 1);

@@ -40,8 +40,6 @@ constexpr std::array<RefineStepInfo, kRefineSteps> kSteps{{
      "cameras move so that overlapping views agree in depth and colour", "Newcombe et al. 2011"},
     {exposure, "exposure", kRefine, found, kFound,
      "colours of cameras that expose for themselves are matched", ""},
-    {pinholes, "pinholes", kRefine, found, kFound,
-     "single pixels that a sensor missed get the depth of the surface around them", ""},
     {noise, "noise", kRefine, found, kFound,
      "noisy depth becomes that of the planes that fit it", "Goldenshluger & Nemirovski 1997"},
     {edges, "edges", kRefine, found, kFound,

@@ -25,7 +25,6 @@ enum class RefineStep {
     align,
     poses,
     exposure,
-    pinholes,
     noise,
     edges,
     silhouettes,
@@ -33,7 +32,7 @@ enum class RefineStep {
     colours,
     strays
 };
-inline constexpr std::size_t kRefineSteps = 16;
+inline constexpr std::size_t kRefineSteps = 15;
 
 /// When a step can be done.
 enum class RefineWhen {

@@ -18,7 +18,6 @@
 #include "lib/refine/gaps.hpp"
 #include "lib/refine/mixed.hpp"
 #include "lib/refine/noise.hpp"
-#include "lib/refine/pinholes.hpp"
 #include "lib/refine/silhouettes.hpp"
 #include "lib/refine/strays.hpp"
 #include "lib/registration/disagreement_by_view.hpp"
@@ -48,7 +47,6 @@ constexpr float kClearlyNoisy = 2.0f;
 struct Work {
     PixelSpace space;
     Image<float> q;  ///< above 0: DepthAxis::q(); 0 = nothing here, -1 = not known
-    Image<std::uint8_t> covered;
 };
 
 double farthestPoint(const RefineView& view) {
@@ -62,21 +60,18 @@ Work workOn(const RefineView& view) {
     const int width = view.depth->width(), height = view.depth->height();
     Work w{PixelSpace(view.header->camera,
                       view.header->camera.orthographic ? farthestPoint(view) : 0.0),
-           Image<float>(width, height), Image<std::uint8_t>(width, height)};
+           Image<float>(width, height)};
     const DepthAxis axis = w.space.axis;
     const auto* bytes = view.texture->rgba8();
     parallelFor(0, height, 32, [&](int y) {
         const float* depth = view.depth->row(y).data();
-        std::uint8_t* covered = w.covered.row(y).data();
         float* q = w.q.row(y).data();
         const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
         for (int x = 0; x < width; ++x) {
             const std::size_t pixel = first + static_cast<std::size_t>(x);
-            covered[x] =
-                (bytes ? bytes->data()[pixel].a == 255 : view.texture->alpha(pixel) >= 1.0f);
-        }
-        for (int x = 0; x < width; ++x) {
-            const float none = covered[x] != 0 && view.header->depthMayBeUnknown() ? -1.0f : 0.0f;
+            const bool covered =
+                bytes ? bytes->data()[pixel].a == 255 : view.texture->alpha(pixel) >= 1.0f;
+            const float none = covered && view.header->depthMayBeUnknown() ? -1.0f : 0.0f;
             const bool point = hasPoint(depth[x]) && depth[x] > 0.0f;
             q[x] = !point         ? none
                    : axis.inverse ? 1.0f / depth[x]
@@ -260,8 +255,6 @@ class SideBySide {
             if (settings_.on(step.step)) repairAll(step);
         begin();
         findNoise();
-        if (settings_.on(RefineStep::pinholes)) closePinholes();
-        for (Work& w : works_) w.covered = {};
         smooth();
         if (settings_.on(RefineStep::edges)) thinEdges();
         // Noise from pixel to pixel; other errors of a sensor are smooth, and only other views
@@ -312,7 +305,6 @@ class SideBySide {
                 if (hasPoint(given_[k].depth->data()[i]) && !hasPoint(views_[k].depth->data()[i]))
                     w.q.data()[i] = -1.0f;
             w.q.moveTo(room_.spool);
-            w.covered.moveTo(room_.spool);
             out_[k].lost = report_.of(RefineStep::mixed).views > 0;
             out_[k].refined = views_[k].header->refined;
         });
@@ -323,20 +315,6 @@ class SideBySide {
         ofEach([&](std::size_t k) { noise_[k] = depthNoise(works_[k].q, works_[k].space.axis); });
         settleNoise(works_, noise_);
         report_.noise = noise_.empty() ? 0.0 : *std::max_element(noise_.begin(), noise_.end());
-    }
-
-    void closePinholes() {
-        RefineStepReport& report = report_.of(RefineStep::pinholes);
-        const Clock clock(report);
-        std::vector<std::int64_t> closed(views_.size());
-        ofEach([&](std::size_t k) {
-            Work& w = works_[k];
-            closed[k] = closeMissedPixels(w.q, w.covered, w.space.axis, noise_[k]);
-        });
-        for (const std::int64_t pixels : closed) {
-            report.views += pixels > 0;
-            report.pixels += pixels;
-        }
     }
 
     void smooth() {

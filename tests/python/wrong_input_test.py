@@ -55,11 +55,27 @@ class WrongInput(Case):
         linear = colour.astype(np.float32)
         linear[0, 0, 0] = np.nan
         self.fails("usage", "colour holds NaN", stx.View, linear, depth, self.camera)
+        for wrong in (-0.5, 1.5):
+            covered = np.ones((4, 6, 4), np.float32)
+            covered[1, 2, 3] = wrong
+            self.fails("usage", "colour has an alpha of %g; 0 to 1 is expected" % wrong, stx.View, covered, depth, self.camera)
         self.fails("usage", "no_depth is 'none'; empty or unknown", stx.View, colour, depth, self.camera, no_depth="none")
         self.fails("usage", "depthBits is 12", stx.View, colour, depth, self.camera, depth_bits=12)
         one = stx.View(colour, depth, self.camera, name="a")
         self.fails("usage", "two views have the name 'a'", stx.Bundle, [one, one])
         self.fails("invalidInput", "view", stx.Bundle, [])
+
+    def test_masked_arrays(self):
+        def masked(array):
+            return np.ma.masked_array(array, mask=np.zeros(array.shape, bool))
+
+        colour, depth = np.zeros((4, 6, 3), np.uint8), np.ones((4, 6), np.float32)
+        self.fails("usage", "colour is a masked array; .filled(VALUE)", stx.View, masked(colour), depth, self.camera)
+        self.fails("usage", "depth is a masked array", stx.View, colour, masked(depth), self.camera)
+        self.fails("usage", "normals is a masked array", stx.View, colour, depth, self.camera, normals=masked(np.ones((4, 6, 3))))
+        self.fails("usage", "mask is a masked array", stx.compare, colour, colour, mask=masked(depth > 0))
+        self.fails("usage", "world_from_camera is a masked array", stx.Camera, (6, 4), 5, world_from_camera=masked(np.eye(4)))
+        self.fails("usage", "frames is a masked array", stx.background, masked(np.zeros((8, 24, 32, 3), np.uint8)))
 
     def test_cameras(self):
         pose = np.eye(4)
@@ -95,6 +111,13 @@ class WrongInput(Case):
         self.fails("usage", "mode is 3; a text", render, bundle, camera, mode=3)
         self.fails("usage", "no stage 'x'", render, bundle, camera, without=["x"])
         self.fails("usage", "ambient is negative", render, bundle, camera, ambient=-1)
+        for wrong in (np.nan, np.inf, -np.inf, 1e300):
+            for name in ("ambient", "specular"):
+                self.fails("usage", f"{name} is {wrong}; finite", render, bundle, camera, **{name: wrong})
+            frame = render(bundle, camera)
+            self.fails("usage", f"background is {wrong}; finite", frame.picture, background=wrong)
+            self.fails("usage", f"background is {wrong}; finite", frame.save, "a.png", background=wrong)
+            self.fails("usage", f"background is {wrong}; finite", stx.compare, frame, frame, background=wrong)
         self.fails("usage", "shininess is 0", render, bundle, camera, shininess=0)
         self.fails("usage", "no stage 'y'", render, bundle, camera, without="holes,y")
         self.fails("usage", "lights is [3]; a list of stx.Light", render, bundle, camera, lights=[3])
@@ -113,6 +136,8 @@ class WrongInput(Case):
     def test_models(self):
         mesh = stx.open(MODEL)
         self.fails("usage", "'circle:3' is not a view layout", stx.convert, mesh, views="circle:3")
+        self.fails("usage", "'circle:3' is not a view layout", stx.convert, self.bundle, views="circle:3")
+        self.fails("usage", "the views are 'auto:x'", stx.convert, self.bundle, views="auto:x")
         self.fails("usage", "size is 0x5", stx.convert, mesh, size=(0, 5))
         self.fails("usage", "cameras is ['a']; a list of stx.Camera", stx.convert, mesh, cameras=["a"])
         self.fails("usage", "intrinsics is (1, 2); four numbers", stx.open, MODEL, intrinsics=(1, 2))

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "tools/python/work.hpp"
 
@@ -20,6 +21,7 @@ std::string described(py::handle value) {
 /// Whatever numpy takes for numbers.
 template <class T>
 py::array_t<T> numbersFrom(py::handle value, const char* name, const char* expected) {
+    refuseMasked(value, name);
     const auto array = py::array::ensure(value);
     if (array && std::strchr("iuf", array.dtype().kind()))
         if (auto numbers = py::array_t<T, py::array::c_style | py::array::forcecast>::ensure(array))
@@ -30,6 +32,7 @@ py::array_t<T> numbersFrom(py::handle value, const char* name, const char* expec
 
 /// An array as it is, of one of the kinds of numbers and with these axes; -1: of any length.
 py::array imageFrom(py::handle value, const char* name, bool fits, const char* expected) {
+    refuseMasked(value, name);
     if (!fits) refuse("{} is {}; {} is expected", name, described(value), expected);
     auto array = py::reinterpret_borrow<py::array>(value);
     for (py::ssize_t axis = 0; axis < 2; ++axis)
@@ -74,6 +77,11 @@ Image<glm::vec<4, T>> withAlpha(const py::array& array, T full) {
 
 }  // namespace
 
+void refuseMasked(py::handle value, const char* name) {
+    if (py::isinstance<py::array>(value) && py::hasattr(value, "filled"))
+        refuse("{} is a masked array; .filled(VALUE) of it, which has no mask, is expected", name);
+}
+
 py::array arrayOfMemory(const py::dtype& type, std::vector<py::ssize_t> shape, const void* data,
                         std::shared_ptr<const void> owner) {
     const py::capsule keeps(new std::shared_ptr<const void>(std::move(owner)), [](void* kept) {
@@ -110,8 +118,12 @@ glm::dvec3 vectorFrom(py::handle value, const char* name) {
 
 glm::vec3 colourFrom(py::handle value, const char* name) {
     const auto numbers = numbersFrom<double>(value, name, "grey or three numbers (r, g, b)");
-    if (numbers.ndim() == 0) return glm::vec3(static_cast<float>(*numbers.data()));
-    return glm::vec3(vectorFrom(value, name));
+    const glm::dvec3 colour =
+        numbers.ndim() == 0 ? glm::dvec3(*numbers.data()) : vectorFrom(value, name);
+    constexpr double kMost = std::numeric_limits<float>::max();
+    if (!glm::all(glm::lessThanEqual(glm::abs(colour), glm::dvec3(kMost))))
+        refuse("{} is {}; finite numbers are expected", name, std::string(py::str(value)));
+    return glm::vec3(colour);
 }
 
 glm::dmat4 poseFrom(py::handle value, const char* name) {

@@ -52,8 +52,12 @@ template <class T>
 [[nodiscard]] py::array_t<double> arrayOf(glm::dvec3 vector);
 [[nodiscard]] py::array_t<double> arrayOf(const glm::dmat4& matrix);
 
+/// Throws stx.Error (usage) where a value is one of numpy's masked arrays, whose mask nothing here
+/// looks at.
+void refuseMasked(py::handle value, const char* name);
+
 /// Arrays of the caller. Each throws stx.Error (usage), which says what `name` is and what is
-/// expected.
+/// expected; masked arrays are refused.
 [[nodiscard]] glm::dvec3 vectorFrom(py::handle value, const char* name);
 /// Grey or r, g, b.
 [[nodiscard]] glm::vec3 colourFrom(py::handle value, const char* name);

@@ -138,6 +138,7 @@ StillPointer stillBackgroundOf(const py::object& frames, const py::dict& keyword
         const auto inputs = frames.cast<std::vector<std::filesystem::path>>();
         return kept(run(job, [&](Job& part) { return background(inputs, settings, part); }));
     }
+    refuseMasked(frames, "frames");
     const auto array = py::reinterpret_borrow<py::array>(frames);
     const bool fits = py::isinstance<py::array_t<std::uint8_t>>(array) && array.ndim() == 4 &&
                       (array.shape(3) == 3 || array.shape(3) == 4) && array.shape(0) >= 1 &&

@@ -43,6 +43,10 @@ ViewPointer makeView(const py::object& colour, const py::object& depth, const Ca
     ReferenceView& view = one.views.emplace_back();
     bool hasAlpha = false;
     view.texture = textureFrom(colour, "colour", &hasAlpha);
+    if (const auto* linear = view.texture.rgbaFloat())
+        for (const glm::vec4 c : linear->pixels())
+            if (c.a < 0.0f || c.a > 1.0f)
+                refuse("colour has an alpha of {:g}; 0 to 1 is expected", c.a);
     view.depth = depthFrom(depth, "depth");
     // As sensors and image sets have it: a surface at the viewpoint would have no size.
     std::ranges::replace(view.depth.pixels(), 0.0f, kNoDepth);

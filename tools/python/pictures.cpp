@@ -160,9 +160,10 @@ void bindFrame(py::module_& module) {
         .def("save", &saveFrame, py::arg("path"), py::kw_only(), py::arg("background") = py::none(),
              py::arg("quality") = 92, py::arg("no_clobber") = false, py::arg("job") = py::none(),
              "Writes it, whole or not at all, by the ending: .png, .jpg (quality 1..100), .tif or "
-             ".webp (8-bit sRGB), .exr (linear, with depth, and normals where it has them). "
-             "background: grey or (r, g, b), sRGB-coded 0..1, put behind it. no_clobber: a target "
-             "that exists is an error. Raises stx.Error (usage, io).")
+             ".webp (8-bit sRGB), .exr (linear, with depth; drawn with normals=True also normals "
+             "and albedo, as 'stx render' writes them). background: grey or (r, g, b), sRGB-coded "
+             "0..1, put behind it. no_clobber: a target that exists is an error. Raises stx.Error "
+             "(usage, io).")
         .def("__repr__", [](const DrawnFrame& d) {
             return fmt::format("<stx.Frame {}x{}>", d.camera.width, d.camera.height);
         });

@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include "lib/refine/pinholes.hpp"
 #include "lib/refine/strays.hpp"
 #include "tests/noisy_depth.hpp"
 
@@ -159,19 +158,6 @@ TEST(DepthNoise, ExactDepthStaysAsItIs) {
     Image<float> q = exact;
     EXPECT_EQ(smoothDepth(q, {}, depthNoise(q, {})), 0.0f);
     for (std::size_t i = 0; i < q.count(); ++i) ASSERT_EQ(q.data()[i], exact.data()[i]);
-}
-
-TEST(DepthNoise, PinholesInASurfaceAreClosedButNoOthers) {
-    const Image<float> exact = steppedPlane(0.05, 0);
-    Image<float> q = exact;
-    Image<std::uint8_t> covered(kNoisySide, kNoisySide, 1);
-    q.at(20, 20) = q.at(60, 30) = q.at(60, 60) = q.at(61, 60) = q.at(kNoisySide / 2, 40) = 0;
-    covered.at(60, 30) = 0;  // background
-    closeMissedPixels(q, covered, {}, 0);
-    EXPECT_NEAR(q.at(20, 20) / exact.at(20, 20), 1, 1e-4);
-    EXPECT_EQ(q.at(60, 30), 0.0f);
-    EXPECT_EQ(q.at(60, 60), 0.0f);              // two pixels
-    EXPECT_EQ(q.at(kNoisySide / 2, 40), 0.0f);  // on the step
 }
 
 }  // namespace

@@ -113,8 +113,6 @@ TEST(RefineInSpool, IsTheSameAsInMemory) {
         EXPECT_GT(noise.of(step).views, 0) << infoOf(step).name;
     const auto edges = expectSameInSpool(spoiled("edges1"), {}, "edges");
     EXPECT_GT(edges.of(RefineStep::edges).views, 0);
-    const auto holes = expectSameInSpool(spoiled("missing3"), {}, "missing");
-    EXPECT_GT(holes.of(RefineStep::pinholes).views, 0);
     const auto light = expectSameInSpool(spoiled("light"), {}, "light");
     EXPECT_GT(light.of(RefineStep::exposure).views, 0);
     EXPECT_FALSE(expectSameInSpool(torusViews(64), {}, "exact").changed());

@@ -200,9 +200,9 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
 
     times: of a film, seconds by its clock (None: all its frames): one time, or as many as there are cameras, or either
     of them once. mode: 'surface' or 'splat'. quality: of surface mode, 'normal' or 'best'. backend: 'auto', 'cpu', 'gpu'
-    or 'gl'; device: number of the GPU (-1: the best). normals: frames have normals and albedo, too. fill: what no view
-    shows: 'background', 'spatial' or 'none'. environment: a file that is shown behind everything; False: not even the
-    model's own. lights: stx.Light; with them ambient and specular: grey or (r, g, b), linear, from 0; shininess: Phong
+    or 'gl'; device: number of the GPU (-1: the best). normals: frames have normals and albedo, too, as 'stx render'
+    writes them into .exr. fill: what no view shows: 'background', 'spatial' or 'none'. environment: a file that is shown
+    behind everything; False: not even the model's own. lights: stx.Light; with them ambient and specular: grey or (r, g, b), linear, from 0; shininess: Phong
     exponent above 0. splat: of splat mode, 'data', 'paper' (with splat_coefficient, pixels times scene units, 0: fitted)
     or 'point'. refine: repairs of captured depth, 'auto', 'off' or steps. without: names of stages that are left out.
     Raises Error: usage, invalidInput (a camera), unsupported (a backend), failed.
