@@ -34,6 +34,15 @@ struct SplatCloud {
     /// Sets one coefficient of a splat; `harmonics` must have its size.
     void setHarmonic(std::size_t splat, int coefficient, int channel, float value);
 
+    /// How far splat `i` reaches: column k leads from its centre to the place that is farthest
+    /// along +k of those where it hides a quarter or more of what is behind it, scene units; where
+    /// some overlap, that is half of it, and pictures have depth. So the box of these places has
+    /// half the size (x of column 0, y of 1, z of 2). Zeros for a splat of an opacity of one half
+    /// or less: it may be as large as it likes.
+    [[nodiscard]] glm::dmat3 reach(std::size_t i) const;
+    /// What it reaches at most in any direction, if it were opaque: quick to tell.
+    [[nodiscard]] double mostReach(std::size_t i) const;
+
     /// Bytes of one splat of that degree.
     [[nodiscard]] static std::uint64_t bytesEach(int degree) {
         return 56 + 6 * static_cast<std::uint64_t>(paddedCount(degree));
