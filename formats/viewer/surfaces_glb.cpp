@@ -15,6 +15,7 @@
 #include "formats/viewer/viewer_page.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/model/translucent.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
 
 namespace stx {
@@ -232,6 +233,7 @@ class Writer {
             glm::u8vec4& colour = view.texture.rgba8()->at(at.x, at.y);
             colour = {glm::u8vec3(surface.ownColours[i] * 255.0f + 0.5f), colour.a};
         }
+        translucent_ = translucent_ || hasTranslucentInside(view.texture, view.depth);
         if (!surface.triangles.empty()) {
             STX_CHECK(addSurface(view, surface));
         }
@@ -261,6 +263,7 @@ class Writer {
                 "its coordinates",
                 o.x, o.y, o.z));
         }
+        if (translucent_) job_.note("translucent surfaces are opaque in the model");
         if (!lit_) root["extensionsUsed"] = {"KHR_materials_unlit"};
         STX_CHECK(model_.write(path, options));
         return report;
@@ -384,7 +387,7 @@ class Writer {
     const Bundle& bundle_;
     int jpegQuality_;
     Job& job_;
-    bool lit_ = false;
+    bool lit_ = false, translucent_ = false;
     std::optional<std::size_t> edgeMaterial_;
     Model model_;
     std::vector<glm::vec3> positions_, normals_;

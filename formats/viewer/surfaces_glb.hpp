@@ -33,7 +33,7 @@ struct SurfacesReport {
 /// their colours as they are (KHR_materials_unlit). The coordinates are the bundle's; one with an
 /// origin stays at it, and the origin is in `asset.extras.origin`.
 ///
-/// Notes: an origin, colours of linear light. Errors: a bundle that fails check(), no surface and
+/// Notes: an origin, colours of linear light, translucent surfaces, which become opaque. Errors: a bundle that fails check(), no surface and
 /// no point, points beyond floats, more than GLB's 4 GiB, memory over the limit, files, cancelled.
 [[nodiscard]] Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle bundle,
                                                    const SurfacesOptions& options, Job& job);

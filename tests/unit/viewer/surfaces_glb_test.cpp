@@ -227,6 +227,17 @@ TEST(SurfacesGlb, IsReadBackAsTheSameSurfaces) {
     for (const glm::vec3& p : mesh->positions) EXPECT_LT(fromTorus(p), 0.01);
 }
 
+TEST(SurfacesGlb, SaysThatGlassIsOpaque) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle bundle = torusViews(48);
+    for (glm::u8vec4& c : bundle.views[0].texture.rgba8()->pixels())
+        if (c.a > 0) c.a = 128;
+    ASSERT_TRUE(writeSurfaces(folder.path() / "a.glb", bundle, {}, job));
+    EXPECT_EQ(job.takeNotes(),
+              std::vector<std::string>{"translucent surfaces are opaque in the model"});
+}
+
 TEST(SurfacesGlb, IsTheSameFromASpool) {
     const TemporaryFolder folder;
     Job job;
