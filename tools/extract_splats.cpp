@@ -93,6 +93,7 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
     ViewTally tally;
     std::atomic<bool> translucent = false;
     std::uint64_t bytes = 0;
+    glm::vec3 up(0, 1, 0);
     for (std::size_t i = first; i < end; ++i) {
         STX_TRY(auto table, frames->views(i, program.job));
         if (i == first) {
@@ -103,7 +104,11 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
             });
         }
         STX_TRY(auto cloud, splatsOfTable(*table, output, settings, program.job));
-        if (i == first) splats = cloud.positions.size();
+        if (i == first) {
+            splats = cloud.positions.size();
+            up = cloud.up;
+        }
+        cloud.up = up;  // whatever the cameras of later frames do: a film is turned as one
         const std::string target = frameName(output, static_cast<int>(i - first)).value_or(output);
         STX_CHECK(writeSplats(target, std::move(cloud), program.outputOptions(), program.job));
         bytes += bytesOf(target);

@@ -24,7 +24,8 @@ struct SplatCloud {
     int degree = 0;  ///< 0..3
     /// Colours are blended as linear light (glTF's lin_rec709_display), not as coded sRGB.
     bool linear = false;
-    /// What is up by the habits of the file's format: not stored in it.
+    /// The coordinate axis that is up, by the habits of the file's format or by the cameras of the
+    /// views that the cloud was made of: not stored in files.
     glm::vec3 up{0, 1, 0};
 
     /// Coefficients of the degrees 1 to `degree`: 0, 3, 8 or 15.
