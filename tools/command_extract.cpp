@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <atomic>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -10,6 +11,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/base/stopwatch.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/model/translucent.hpp"
 #include "lib/model/view_table.hpp"
 #include "tools/commands.hpp"
 #include "tools/extract_shown.hpp"
@@ -174,6 +176,10 @@ struct Extracted {
     std::int64_t points = 0;
 };
 
+void noteTranslucentPoints(Job& job) {
+    job.note("points of translucent surfaces are opaque in the file");
+}
+
 /// A .ply, view by view.
 Result<Extracted> extractPly(const ExtractOptions& o, const PeakMemory& takes, Sequence& frames,
                              std::size_t moment, Program& program) {
@@ -185,10 +191,12 @@ Result<Extracted> extractPly(const ExtractOptions& o, const PeakMemory& takes, S
     STX_TRY(auto file, PlyInParts::create(o.output, {count, normals, true, false, origin},
                                           program.outputOptions()));
     std::vector<Bytes> rows(table->count());
+    std::atomic<bool> translucent = false;
     const auto encode = [&](std::size_t i,
                             const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
         Points points;
         points.add(*view, normals);
+        if (hasTranslucentInside(view->texture, view->depth)) translucent = true;
         STX_TRY(rows[i], file.encode(points.cloud(origin)));
         return {};
     };
@@ -197,6 +205,7 @@ Result<Extracted> extractPly(const ExtractOptions& o, const PeakMemory& takes, S
     };
     STX_CHECK(forEachView(*table, takes, program.job, encode, add));
     STX_CHECK(file.commit());
+    if (translucent) noteTranslucentPoints(program.job);
     return Extracted{counted(count, "point"), table->count(), static_cast<std::int64_t>(count)};
 }
 
@@ -207,6 +216,10 @@ Result<Extracted> extractPoints(const ExtractOptions& o, const PeakMemory& takes
     const bool normals = std::ranges::all_of(bundle.views, &ReferenceView::hasNormals);
     Points found;
     for (const ReferenceView& view : bundle.views) found.add(view, normals);
+    if (std::ranges::any_of(bundle.views, [](const ReferenceView& view) {
+            return hasTranslucentInside(view.texture, view.depth);
+        }))
+        noteTranslucentPoints(program.job);
     PointWriteOptions write = o.points;
     write.file.noClobber = program.common.noClobber;
     STX_CHECK(writePoints(o.output, found.cloud(bundle.origin), program.job, write));

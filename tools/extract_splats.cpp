@@ -1,6 +1,7 @@
 #include "tools/extract_splats.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <map>
 
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 #include "formats/files/numbered.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "lib/base/stopwatch.hpp"
+#include "lib/model/translucent.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/refining.hpp"
 #include "tools/view_tally.hpp"
@@ -89,21 +91,32 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
     }
     std::size_t views = 0, splats = 0;
     ViewTally tally;
+    std::atomic<bool> translucent = false;
     std::uint64_t bytes = 0;
+    glm::vec3 up(0, 1, 0);
     for (std::size_t i = first; i < end; ++i) {
         STX_TRY(auto table, frames->views(i, program.job));
         if (i == first) {
             views = table->count();
-            table = watchedViews(std::move(table), [&](auto k, auto& view) { tally.add(k, view); });
+            table = watchedViews(std::move(table), [&](auto k, auto& view) {
+                tally.add(k, view);
+                if (hasTranslucentInside(view.texture, view.depth)) translucent = true;
+            });
         }
         STX_TRY(auto cloud, splatsOfTable(*table, output, settings, program.job));
-        if (i == first) splats = cloud.positions.size();
+        if (i == first) {
+            splats = cloud.positions.size();
+            up = cloud.up;
+        }
+        cloud.up = up;  // whatever the cameras of later frames do: a film is turned as one
         const std::string target = frameName(output, static_cast<int>(i - first)).value_or(output);
         STX_CHECK(writeSplats(target, std::move(cloud), program.outputOptions(), program.job));
         bytes += bytesOf(target);
         program.job.progress(static_cast<std::int64_t>(i - first) + 1,
                              static_cast<std::int64_t>(end - first), "writing splats");
     }
+    if (translucent)
+        program.job.note("translucent surfaces are opaque or nearly so as splats, which overlap");
     const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format(

@@ -156,7 +156,13 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
                         "--sway moves around the pose of a reference view, and a mesh has none; "
                         "--orbit goes around it");
         STX_CHECK(mesh->check());
-        if (mesh->splats) scene.context.up = mesh->splats->up;
+        if (mesh->splats) {
+            scene.context.up = mesh->splats->up;
+            if (!o.lights.empty())
+                program.job.note(
+                    "splats have their light in their colours, and --light changes nothing; views "
+                    "of them (stx convert) can be lit");
+        }
     }
     if (const auto* bundle = std::get_if<Bundle>(&scene.model)) STX_CHECK(addViews(*bundle));
     if (const auto* atlas = std::get_if<Atlas>(&scene.model)) STX_CHECK(addViews(*atlas));

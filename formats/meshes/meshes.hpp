@@ -110,11 +110,12 @@ class PlyInParts {
 };
 
 /// Writes a cloud of splats, whole or not at all, by the ending of `path`: .ply (INRIA's binary
-/// PLY, turned by half around X where up is +Y in the cloud, since up is -Y in such files), .spz
-/// (Niantic's version 3) or .glb (KHR_gaussian_splatting, with COLOR_0 for viewers that know only
-/// points). Harmonics are left out, with a note. The same input gives the same bytes. What is
-/// rounded is said with job.note(). Errors: usage (another ending), (invalidInput) coordinates that
-/// SPZ's 24 bits do not hold, more than GLB's 4 GiB; memory over the limit, io.
+/// PLY), .spz (Niantic's version 3) or .glb (KHR_gaussian_splatting, with COLOR_0 for viewers that
+/// know only points). What is up in the cloud (SplatCloud::up) is turned to what is up in such
+/// files, -Y in PLY and +Y in the others, with a note but for +Y to -Y. Harmonics are left out,
+/// with a note. The same input gives the same bytes. What is rounded is said with job.note().
+/// Errors: usage (another ending), (invalidInput) coordinates that SPZ's 24 bits do not hold, more
+/// than GLB's 4 GiB; memory over the limit, io.
 [[nodiscard]] Result<void> writeSplats(const std::filesystem::path& path, SplatCloud cloud,
                                        OutputFile::Options options, Job& job);
 

@@ -14,7 +14,9 @@
 #include "formats/viewer/page_scene.hpp"
 #include "formats/viewer/viewer_page.hpp"
 #include "lib/base/counted.hpp"
+#include "lib/geometry/view_layout.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/model/translucent.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
 
 namespace stx {
@@ -101,6 +103,15 @@ class Model {
             add("meshes", {{"name", name}, {"primitives", std::move(primitives)}});
         const std::size_t node = add("nodes", {{"name", std::move(name)}, {"mesh", mesh}});
         root_["scenes"][0]["nodes"].push_back(node);
+    }
+
+    /// Puts all nodes below one that turns them.
+    void turn(const glm::dmat3& by) {
+        const glm::dquat q = glm::normalize(glm::quat_cast(by));
+        const std::size_t node = add("nodes", {{"name", "up"},
+                                               {"rotation", {q.x, q.y, q.z, q.w}},
+                                               {"children", root_["scenes"][0]["nodes"]}});
+        root_["scenes"][0]["nodes"] = Json::array({node});
     }
 
     Result<void> write(const std::filesystem::path& path, OutputFile::Options options) {
@@ -232,6 +243,7 @@ class Writer {
             glm::u8vec4& colour = view.texture.rgba8()->at(at.x, at.y);
             colour = {glm::u8vec3(surface.ownColours[i] * 255.0f + 0.5f), colour.a};
         }
+        translucent_ = translucent_ || hasTranslucentInside(view.texture, view.depth);
         if (!surface.triangles.empty()) {
             STX_CHECK(addSurface(view, surface));
         }
@@ -252,15 +264,25 @@ class Writer {
         if (report.triangles + report.points == 0)
             return fail(ErrorCode::invalidInput, "the bundle has no points to make a model of");
         Json& root = model_.root();
+        std::vector<Camera> cameras;
+        for (const ReferenceView& view : bundle_.views) cameras.push_back(view.camera);
+        const glm::dmat3 turn = turnOfUp(upOfCameras(cameras), {0, 1, 0});
+        if (turn != glm::dmat3(1.0)) {
+            model_.turn(turn);
+            job_.note(fmt::format(
+                "the model is turned by a node, x y z to {}, so that +Y is up, as it is in glTF",
+                turnedAxes(turn)));
+        }
         if (!bundle_.title.empty()) root["scenes"][0]["name"] = bundle_.title;
         if (bundle_.origin != glm::dvec3(0.0)) {
-            const glm::dvec3 o = bundle_.origin;
+            const glm::dvec3 o = turn * bundle_.origin;
             root["asset"]["extras"]["origin"] = {o.x, o.y, o.z};
             job_.note(fmt::format(
                 "the model stays at the origin, since glTF has floats only; add ({}, {}, {}) to "
                 "its coordinates",
                 o.x, o.y, o.z));
         }
+        if (translucent_) job_.note("translucent surfaces are opaque in the model");
         if (!lit_) root["extensionsUsed"] = {"KHR_materials_unlit"};
         STX_CHECK(model_.write(path, options));
         return report;
@@ -384,7 +406,7 @@ class Writer {
     const Bundle& bundle_;
     int jpegQuality_;
     Job& job_;
-    bool lit_ = false;
+    bool lit_ = false, translucent_ = false;
     std::optional<std::size_t> edgeMaterial_;
     Model model_;
     std::vector<glm::vec3> positions_, normals_;

@@ -30,11 +30,13 @@ struct SurfacesReport {
 /// with the view's colour as texture (triangles beside another surface, whose colour a filter would
 /// mix in, have colours of their corners), and one of points for what is on no surface. Bundles
 /// with normals (SimpleTextureV2) have them in the model and take the viewer's light; others show
-/// their colours as they are (KHR_materials_unlit). The coordinates are the bundle's; one with an
-/// origin stays at it, and the origin is in `asset.extras.origin`.
+/// their colours as they are (KHR_materials_unlit). The coordinates are the bundle's; where
+/// its up (upOfCameras()) is not +Y, as glTF has it, a node above all others turns them. A bundle
+/// with an origin stays at it, and the origin, turned, too, is in `asset.extras.origin`.
 ///
-/// Notes: an origin, colours of linear light. Errors: a bundle that fails check(), no surface and
-/// no point, points beyond floats, more than GLB's 4 GiB, memory over the limit, files, cancelled.
+/// Notes: an origin, a turn, colours of linear light, translucent surfaces, which become opaque.
+/// Errors: a bundle that fails check(), no surface and no point, points beyond floats, more than
+/// GLB's 4 GiB, memory over the limit, files, cancelled.
 [[nodiscard]] Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle bundle,
                                                    const SurfacesOptions& options, Job& job);
 

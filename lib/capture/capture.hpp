@@ -51,7 +51,8 @@ struct CaptureSettings {
 void fitDepthRange(ReferenceView& view);
 
 /// What of a mesh is drawn, as points that cameras frame: the corners of its triangles, each vertex
-/// once, and those of the discs that its loose points become; not its strays (findStrays()).
+/// once, those of the discs that its loose points become, and of splats the tips of what hides half
+/// of what is behind it (SplatCloud::reach()); not its strays (findStrays()).
 [[nodiscard]] std::vector<glm::vec3> drawnPoints(const Mesh& mesh);
 
 }  // namespace stx

@@ -80,6 +80,26 @@ glm::dquat rotationToUp(glm::dvec3 up) {
     return glm::normalize(glm::dquat(1 + cosine, axis.x, axis.y, axis.z));
 }
 
+glm::dmat3 turnOfUp(glm::dvec3 from, glm::dvec3 to) {
+    glm::dmat3 turn =
+        glm::mat3_cast(rotationToUp(to)) * glm::transpose(glm::mat3_cast(rotationToUp(from)));
+    for (int k = 0; k < 3; ++k) turn[k] = glm::round(turn[k]) + 0.0;  // without zeros below 0
+    return turn;
+}
+
+std::string turnedAxes(const glm::dmat3& turn) {
+    std::string text;
+    for (int row = 0; row < 3; ++row) {
+        for (int k = 0; k < 3; ++k) {
+            if (turn[k][row] == 0) continue;
+            if (!text.empty()) text += ' ';
+            if (turn[k][row] < 0) text += '-';
+            text += "xyz"[k];
+        }
+    }
+    return text;
+}
+
 glm::dvec3 upOfCameras(const std::vector<Camera>& cameras) {
     constexpr double kTilt = 0.2;     // sine of what a hand tilts a camera by
     constexpr double kUpright = 0.3;  // of the mean: else they look down or are upside down

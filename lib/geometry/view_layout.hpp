@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -42,6 +43,13 @@ struct ViewFraming {
 /// The shortest rotation that takes +Y to `up` (which need not be unit). So the front, +Z, of an
 /// object that stands on +Z is -Y, as in programs whose models do.
 [[nodiscard]] glm::dquat rotationToUp(glm::dvec3 up);
+
+/// The rotation that takes an object whose up is `from` to one whose up is `to`, both coordinate
+/// axes; its numbers are whole. +Y goes to `to` as by rotationToUp().
+[[nodiscard]] glm::dmat3 turnOfUp(glm::dvec3 from, glm::dvec3 to);
+
+/// What it makes of coordinates, for people: "x z -y".
+[[nodiscard]] std::string turnedAxes(const glm::dmat3& turn);
 
 /// The coordinate axis along which cameras stand upright: none is tilted sideways against it by
 /// more than some degrees. +Y when it is one of these, or when none is.

@@ -1,8 +1,10 @@
 #include "lib/model/splat_cloud.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <glm/gtc/packing.hpp>
+#include <glm/gtc/quaternion.hpp>
 
 namespace stx {
 namespace {
@@ -10,6 +12,14 @@ namespace {
 /// Beyond it squares of sizes in pixels are more than doubles hold; nothing that is meant is so
 /// large.
 constexpr float kLargest = 1e15f;
+
+/// Opacity from which a splat counts for what a cloud reaches: alone it gives pictures depth.
+constexpr double kSeen = 0.5;
+/// And the alpha to which it counts. Where pictures have depth, an alpha of one half, is further
+/// out than where one splat alone has that: of seven clouds of 9 to 1000 splats framed so 0.5 to 7
+/// % of the side are cut off, with 0.25 0.5 % of one cloud, with 0.15 nothing, but nearly twice as
+/// much stays free around the others (by the centres alone 4 to 28 % are cut off).
+constexpr double kEdge = 0.25;
 
 bool finite(glm::vec3 v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -21,6 +31,26 @@ void SplatCloud::setHarmonic(std::size_t splat, int coefficient, int channel, fl
     const auto padded = static_cast<std::size_t>(paddedCount(degree));
     harmonics[(splat * 3 + static_cast<std::size_t>(channel)) * padded +
               static_cast<std::size_t>(coefficient)] = glm::packHalf1x16(value);
+}
+
+double SplatCloud::mostReach(std::size_t i) const {
+    const glm::dvec3 size(scales[i]);
+    return std::sqrt(2.0 * std::log(1.0 / kEdge)) * std::max({size.x, size.y, size.z});
+}
+
+glm::dmat3 SplatCloud::reach(std::size_t i) const {
+    const double opacity = opacities[i];
+    if (!(opacity > kSeen)) return glm::dmat3(0.0);
+    const double deviations = std::sqrt(2.0 * std::log(opacity / kEdge));
+    const glm::dvec4 q(rotations[i]);
+    glm::dmat3 axes = glm::mat3_cast(glm::dquat(q.w, q.x, q.y, q.z));
+    for (int k = 0; k < 3; ++k) axes[k] *= static_cast<double>(scales[i][k]);
+    glm::dmat3 covariance = axes * glm::transpose(axes);
+    for (int k = 0; k < 3; ++k) {
+        const double along = std::sqrt(covariance[k][k]);
+        covariance[k] *= along > 0 ? deviations / along : 0.0;
+    }
+    return covariance;
 }
 
 Result<void> SplatCloud::resize(std::size_t count, int degreeToHold, const Limits& limits) {

@@ -24,7 +24,8 @@ struct SplatCloud {
     int degree = 0;  ///< 0..3
     /// Colours are blended as linear light (glTF's lin_rec709_display), not as coded sRGB.
     bool linear = false;
-    /// What is up by the habits of the file's format: not stored in it.
+    /// The coordinate axis that is up, by the habits of the file's format or by the cameras of the
+    /// views that the cloud was made of: not stored in files.
     glm::vec3 up{0, 1, 0};
 
     /// Coefficients of the degrees 1 to `degree`: 0, 3, 8 or 15.
@@ -33,6 +34,15 @@ struct SplatCloud {
     [[nodiscard]] static int paddedCount(int degree) { return degree == 0 ? 0 : 2 << degree; }
     /// Sets one coefficient of a splat; `harmonics` must have its size.
     void setHarmonic(std::size_t splat, int coefficient, int channel, float value);
+
+    /// How far splat `i` reaches: column k leads from its centre to the place that is farthest
+    /// along +k of those where it hides a quarter or more of what is behind it, scene units; where
+    /// some overlap, that is half of it, and pictures have depth. So the box of these places has
+    /// half the size (x of column 0, y of 1, z of 2). Zeros for a splat of an opacity of one half
+    /// or less: it may be as large as it likes.
+    [[nodiscard]] glm::dmat3 reach(std::size_t i) const;
+    /// What it reaches at most in any direction, if it were opaque: quick to tell.
+    [[nodiscard]] double mostReach(std::size_t i) const;
 
     /// Bytes of one splat of that degree.
     [[nodiscard]] static std::uint64_t bytesEach(int degree) {

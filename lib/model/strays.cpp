@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "lib/model/splat_cloud.hpp"
+
 namespace stx {
 namespace {
 
@@ -48,6 +50,31 @@ Piece pieceOf(const Mesh& mesh, std::uint64_t i) {
     const auto& t = mesh.triangles[i];
     const glm::dvec3 a(mesh.positions[t.x]), b(mesh.positions[t.y]), c(mesh.positions[t.z]);
     return {glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c))};
+}
+
+/// Of all splats but the strays, as far as they reach. Which are strays goes by their centres: one
+/// far off is no part of the object for being large.
+Bounds boundsOfSplats(const Mesh& mesh, const Strays& strays) {
+    Bounds bounds;
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+        if (next < strays.pieces.size() && strays.pieces[next] == i) {
+            ++next;
+            continue;
+        }
+        const std::uint32_t p = mesh.points[i];
+        const glm::dvec3 centre(mesh.positions[p]);
+        const glm::dvec3 most(mesh.splats->mostReach(p));
+        Bounds wide = bounds;
+        wide.add(centre - most);
+        wide.add(centre + most);
+        if (wide == bounds) continue;
+        const glm::dmat3 reach = mesh.splats->reach(p);
+        const glm::dvec3 half(reach[0][0], reach[1][1], reach[2][2]);
+        bounds.add(centre - half);
+        bounds.add(centre + half);
+    }
+    return bounds;
 }
 
 }  // namespace
@@ -97,8 +124,10 @@ Strays findStrays(std::uint64_t count, const std::function<Piece(std::uint64_t)>
 }
 
 Strays findStrays(const Mesh& mesh) {
-    return findStrays(mesh.triangles.size() + mesh.points.size(),
-                      [&](std::uint64_t i) { return pieceOf(mesh, i); });
+    Strays strays = findStrays(mesh.triangles.size() + mesh.points.size(),
+                               [&](std::uint64_t i) { return pieceOf(mesh, i); });
+    if (mesh.splats) strays.bounds = boundsOfSplats(mesh, strays);
+    return strays;
 }
 
 void noteStrays(const Strays& strays, std::uint64_t count, const char* what, glm::dvec3 shift,

@@ -9,6 +9,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "lib/base/parallel.hpp"
+#include "lib/geometry/view_layout.hpp"
 #include "lib/model/peak_memory.hpp"
 #include "lib/model/some_views.hpp"
 #include "lib/splats/finest.hpp"
@@ -229,7 +230,11 @@ Result<SplatCloud> splatsOfViews(const ViewTable& table, const SplatSettings& se
                                  PixelSpool* spool, Job& job) {
     STX_TRY(const auto ordered, withAxes(someViewsOf(table, orderOf(table.about()))));
     STX_TRY(auto images, finestDiscs(*ordered, settings, spool, job));
-    return cloudOf(std::move(images), table.about().origin, settings, spool, job);
+    STX_TRY(auto cloud, cloudOf(std::move(images), table.about().origin, settings, spool, job));
+    std::vector<Camera> cameras;
+    for (const ViewHeader& view : table.about().views) cameras.push_back(view.camera);
+    cloud.up = glm::vec3(upOfCameras(cameras));
+    return cloud;
 }
 
 std::uint64_t memoryOfSpooledSplats(const ViewTable& table, const Limits& limits,

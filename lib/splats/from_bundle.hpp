@@ -25,7 +25,7 @@ struct SplatSettings {
 /// (see SplatSettings::pixelsPerTexel), flat in its surface, along the axes of its ellipse (those
 /// of bake() where a view has none), with its colour and 0.99 of its alpha. Splats of background
 /// views come first. The coordinates are the world's: an origin is added, with a note where floats
-/// round it.
+/// round it. What is up in the cloud is that of the views' cameras (upOfCameras()).
 ///
 /// Views are read one by one. What is known of each pixel is in a spool, if any: then memory is
 /// taken for one view for each thread, and for the cloud.

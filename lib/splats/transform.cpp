@@ -14,23 +14,22 @@ namespace {
 
 using Turn = Eigen::MatrixXd;
 
-/// The nearest rotation of a linear map.
-glm::dmat3 rotationOf(const glm::dmat3& linear) {
+/// The nearest orthogonal map of a linear one, which mirrors where that does.
+glm::dmat3 turnOf(const glm::dmat3& linear) {
     Eigen::Matrix3d m;
     for (int c = 0; c < 3; ++c)
         for (int r = 0; r < 3; ++r) m(r, c) = linear[c][r];
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Eigen::Matrix3d turn = svd.matrixU() * svd.matrixV().transpose();
-    if (turn.determinant() < 0) turn = -turn;
+    const Eigen::Matrix3d turn = svd.matrixU() * svd.matrixV().transpose();
     glm::dmat3 out;
     for (int c = 0; c < 3; ++c)
         for (int r = 0; r < 3; ++r) out[c][r] = turn(r, c);
     return out;
 }
 
-/// What turns coefficients with the cloud: f'(v) = f(R^-1 v), which determines them by the values
-/// in enough directions.
-Turn turnOfHarmonics(const glm::dmat3& rotation, int degree) {
+/// What turns and mirrors coefficients with the cloud: f'(v) = f(T^-1 v), which determines them by
+/// the values in enough directions.
+Turn turnOfHarmonics(const glm::dmat3& turn, int degree) {
     constexpr int kDirections = 64;
     const int n = SplatCloud::coefficientCount(degree);
     Eigen::MatrixXd now(kDirections, n), before(kDirections, n);
@@ -42,7 +41,7 @@ Turn turnOfHarmonics(const glm::dmat3& rotation, int degree) {
         float basis[16];
         splats::harmonicsBasis(v, degree, basis);
         for (int k = 0; k < n; ++k) now(i, k) = basis[k];
-        splats::harmonicsBasis(glm::transpose(rotation) * v, degree, basis);
+        splats::harmonicsBasis(glm::transpose(turn) * v, degree, basis);
         for (int k = 0; k < n; ++k) before(i, k) = basis[k];
     }
     return now.householderQr().solve(before);
@@ -53,21 +52,21 @@ Turn turnOfHarmonics(const glm::dmat3& rotation, int degree) {
 void transformSplats(SplatCloud& cloud, std::size_t first, const glm::dmat4& worldFromCloud) {
     if (worldFromCloud == glm::dmat4(1.0)) return;
     const glm::dmat3 linear(worldFromCloud);
-    const glm::dmat3 rotation = rotationOf(linear);
+    const glm::dmat3 turn = turnOf(linear);
     const double scale = std::cbrt(std::abs(glm::determinant(linear)));
     // Without a stretch and a mirror the axes stay.
     double rest = 0;
-    for (int c = 0; c < 3; ++c) rest = std::max(rest, glm::length(linear[c] - rotation[c] * scale));
-    const bool rigid = rest <= 1e-6 * scale;
-    const glm::dquat turn = glm::quat_cast(rotation);
-    const Turn harmonics = cloud.degree > 0 ? turnOfHarmonics(rotation, cloud.degree) : Turn();
+    for (int c = 0; c < 3; ++c) rest = std::max(rest, glm::length(linear[c] - turn[c] * scale));
+    const bool rigid = rest <= 1e-6 * scale && glm::determinant(turn) > 0;
+    const glm::dquat rotation = rigid ? glm::quat_cast(turn) : glm::dquat(1, 0, 0, 0);
+    const Turn harmonics = cloud.degree > 0 ? turnOfHarmonics(turn, cloud.degree) : Turn();
     const auto padded = static_cast<std::size_t>(SplatCloud::paddedCount(cloud.degree));
     const auto apply = [&](std::size_t i) {
         cloud.positions[i] =
             glm::vec3(worldFromCloud * glm::dvec4(glm::dvec3(cloud.positions[i]), 1.0));
         const glm::vec4 q = cloud.rotations[i];
         const glm::dquat own = glm::normalize(glm::dquat(q.w, q.x, q.y, q.z));
-        glm::dquat turned = turn * own;
+        glm::dquat turned = rotation * own;
         if (rigid) {
             cloud.scales[i] *= static_cast<float>(scale);
         } else {

@@ -9,6 +9,7 @@
 #include "formats/meshes/meshes.hpp"
 #include "formats/meshes/splats/spz.hpp"
 #include "lib/base/counted.hpp"
+#include "lib/geometry/view_layout.hpp"
 #include "lib/model/texture.hpp"
 #include "lib/splats/transform.hpp"
 
@@ -30,9 +31,21 @@ float logSize(float size) {
     return std::log(std::max(size, kLeastSize));
 }
 
-Bytes encodePly(SplatCloud cloud) {
-    if (cloud.up == glm::vec3(0, 1, 0))
-        transformSplats(cloud, 0, glm::dmat4(glm::dmat3(1, 0, 0, 0, -1, 0, 0, 0, -1)));
+/// Turns what is up in a cloud to where files of that kind have it.
+void turnUp(SplatCloud& cloud, glm::vec3 habit, Job& job) {
+    if (cloud.up == habit) return;
+    const glm::dmat3 turn = turnOfUp(cloud.up, habit);
+    // Of +Y the page of the formats says it.
+    if (cloud.up != glm::vec3(0, 1, 0))
+        job.note(
+            fmt::format("the splats are turned, x y z to {}, so that {} is up, as it is in "
+                        "such files",
+                        turnedAxes(turn), habit.y < 0 ? "-Y" : "+Y"));
+    transformSplats(cloud, 0, glm::dmat4(turn));
+    cloud.up = habit;
+}
+
+Bytes encodePly(const SplatCloud& cloud) {
     const std::size_t count = cloud.positions.size();
     std::string header =
         fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", count);
@@ -257,6 +270,7 @@ Result<void> writeSplats(const std::filesystem::path& path, SplatCloud cloud,
     }
     auto ending = path.extension().string();
     for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    turnUp(cloud, ending == ".ply" ? glm::vec3(0, -1, 0) : glm::vec3(0, 1, 0), job);
     // Arrays and the file that is made of them.
     STX_CHECK(job.limits.checkAllocation(cloud.positions.size(), ending == ".glb" ? 180 : 112,
                                          "the file of splats"));
@@ -264,7 +278,7 @@ Result<void> writeSplats(const std::filesystem::path& path, SplatCloud cloud,
         fail(ErrorCode::usage, "splats are written as .ply, .spz or .glb, not as '{}'",
              path.filename().string());
     if (ending == ".ply")
-        bytes = encodePly(std::move(cloud));
+        bytes = encodePly(cloud);
     else if (ending == ".spz")
         bytes = encodeSpz(cloud, job);
     else if (ending == ".glb")

@@ -1,49 +1,14 @@
 #include <algorithm>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/translucent.hpp"
 #include "lib/render/scene/page_set.hpp"
 
 namespace stx {
 namespace {
 
-/// Pixels around a translucent point that must be such, too, for it to be inside of glass; what is
-/// partly covered along an outline is narrower.
-constexpr int kInside = 2;
-/// How far full alpha reaches from there: over the border of the glass.
+/// How far full alpha reaches from points inside of glass, pixels: over its border.
 constexpr int kReach = 4;
-
-/// 1 for the points inside of translucent surfaces.
-Image<std::uint8_t> translucentInside(const Texture& texture, const Image<float>& depth) {
-    const int w = depth.width(), h = depth.height();
-    Image<std::uint8_t> inside(w, h, std::uint8_t{0});
-    const auto isTranslucent = [&](int x, int y) {
-        const std::size_t texel = static_cast<std::size_t>(y) * w + x;
-        const float alpha = texture.alpha(texel);
-        return alpha > 0.0f && alpha < 1.0f && hasPoint(depth.data()[texel]);
-    };
-    // Most pictures have no such pixel at all: this is a loop that compilers make vectors of.
-    const auto mayBeTranslucent = [&](int y) {
-        const auto* bytes = texture.rgba8();
-        if (!bytes) return true;
-        int any = 0;
-        for (const glm::u8vec4 p : bytes->row(y))
-            any |= static_cast<int>(static_cast<std::uint8_t>(p.a - 1) < 254);
-        return any != 0;
-    };
-    parallelFor(kInside, h - kInside, [&](int y) {
-        if (!mayBeTranslucent(y)) return;
-        for (int x = kInside; x + kInside < w; ++x) {
-            if (!isTranslucent(x, y)) continue;
-            bool all = true;
-            for (int dy = -kInside; all && dy <= kInside; ++dy) {
-                for (int dx = -kInside; all && dx <= kInside; ++dx)
-                    all = isTranslucent(x + dx, y + dy);
-            }
-            inside.at(x, y) = all ? 1 : 0;
-        }
-    });
-    return inside;
-}
 
 /// 1 for all pixels within kReach of those of 1, along both axes.
 Image<std::uint8_t> widened(const Image<std::uint8_t>& from) {

@@ -84,6 +84,27 @@ TEST(Splats, GlbIsReadAsItIsWritten) {
     EXPECT_EQ(back.up, glm::vec3(0, 1, 0));
 }
 
+TEST(Splats, WhatIsUpInACloudIsUpInItsFile) {
+    SplatCloud cloud = randomCloud(300, 0, 2);
+    // A cloud whose up is as that of the file's kind stays as it is.
+    cloud.up = {0, -1, 0};
+    std::string notes;
+    expectAlike(cloud, readBack(written(cloud, "a.ply", &notes), "a.ply"), 0, 1e-5, 2e-6);
+    EXPECT_EQ(notes, "");
+    expectAlike(turned(cloud), readBack(written(cloud, "a.glb", &notes), "a.glb"), 0, 1e-5, 2e-6);
+    EXPECT_EQ(notes,
+              "the splats are turned, x y z to x -y -z, so that +Y is up, as it is in such "
+              "files\n");
+    cloud.up = {0, 0, 1};
+    for (const auto& [name, y] : {std::pair{"a.ply", -1.0f}, {"a.glb", 1.0f}}) {
+        const SplatCloud back = readBack(written(cloud, name), name);
+        for (std::size_t i = 0; i < cloud.positions.size(); ++i) {
+            EXPECT_EQ(back.positions[i].y, y * cloud.positions[i].z);
+            EXPECT_EQ(back.positions[i].x, cloud.positions[i].x);
+        }
+    }
+}
+
 TEST(Splats, SpzRoundsAsItSays) {
     const SplatCloud cloud = randomCloud(300, 0, 3);
     std::string notes;

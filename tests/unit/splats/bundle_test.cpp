@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/packing.hpp>
 
 #include "lib/capture/capture.hpp"
@@ -260,6 +261,26 @@ TEST(TransformSplats, ATurnedCloudSeenByATurnedCameraIsTheSame) {
     for (std::size_t i = 0; i < a->colour.count(); ++i)
         for (int k = 0; k < 4; ++k)
             EXPECT_NEAR(a->colour.pixels()[i][k], b->colour.pixels()[i][k], 0.01f);
+}
+
+TEST(TransformSplats, AMirroredCloudIsTheMirroredPicture) {
+    const SplatCloud cloud = randomCloud(500, 3, 4);
+    for (const glm::dvec3 scale : {glm::dvec3(-1, 1, 1), glm::dvec3(-1, -1, -1)}) {
+        SplatCloud mirrored = cloud;
+        transformSplats(mirrored, 0, glm::scale(glm::dmat4(1), scale));
+        const glm::dvec3 place(1, 1, 3);
+        Job job;
+        // Both upright, so that x of the second picture runs from right to left; that of the
+        // inversion is turned by half.
+        const auto a = drawSplats(cloud, cameraFrom(place, 96, 96), false, job),
+                   b = drawSplats(mirrored, cameraFrom(scale * place, 96, 96), false, job);
+        for (int y = 0; y < 96; ++y)
+            for (int x = 0; x < 96; ++x)
+                for (int k = 0; k < 4; ++k)
+                    EXPECT_NEAR(a->colour.at(x, y)[k],
+                                b->colour.at(scale.y < 0 ? x : 95 - x, scale.y < 0 ? 95 - y : y)[k],
+                                0.01f);
+    }
 }
 
 TEST(TransformSplats, AStretchedSplatHasTheAxesOfItsCovariance) {

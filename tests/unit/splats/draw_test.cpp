@@ -270,6 +270,33 @@ TEST(CaptureOfSplats, SaysWhatIsTooFaintForDepth) {
     }
 }
 
+TEST(CaptureOfSplats, FramesWhatHidesHalfOfWhatIsBehind) {
+    // A rod of one splat, turned by 30 degrees about z, and a huge one that is hardly seen. Where
+    // splats overlap, a quarter of each is half.
+    SplatCloud cloud;
+    ASSERT_TRUE(cloud.resize(2, 0, Limits()));
+    cloud.rotations[0] = glm::vec4(0, 0, std::sin(M_PI / 12), std::cos(M_PI / 12));
+    cloud.rotations[1] = glm::vec4(0, 0, 0, 1);
+    cloud.scales = {{1.0f, 0.1f, 0.05f}, {50, 50, 50}};
+    cloud.opacities = {0.98f, 0.3f};
+    Mesh mesh;
+    mesh.positions = cloud.positions;
+    mesh.points = {0, 1};
+    mesh.splats = std::make_shared<const SplatCloud>(cloud);
+    const double reach = std::sqrt(2 * std::log(0.98 / 0.25));
+    const double x = reach * std::hypot(std::cos(M_PI / 6), 0.1 * std::sin(M_PI / 6)),
+                 y = reach * std::hypot(std::sin(M_PI / 6), 0.1 * std::cos(M_PI / 6));
+    const Bounds bounds = mesh.bounds();
+    EXPECT_NEAR(bounds.max.x, x, 1e-5);
+    EXPECT_NEAR(bounds.min.y, -y, 1e-5);
+    EXPECT_NEAR(bounds.max.z, 0.05 * reach, 1e-5);
+    Bounds framed;
+    for (const glm::vec3 p : drawnPoints(mesh)) framed.add(p);
+    EXPECT_NEAR(framed.max.x, x, 1e-5);
+    EXPECT_NEAR(framed.min.y, -y, 1e-5);
+    EXPECT_NEAR(framed.max.z, 0.05 * reach, 1e-5);
+}
+
 TEST(DrawSplats, HugeSplatsStayWithinTheMemoryLimit) {
     SplatCloud cloud = randomCloud(20000, 0, 3);
     for (auto& s : cloud.scales) s = glm::vec3(1e14f, 1e14f, 1e-12f);

@@ -227,6 +227,36 @@ TEST(SurfacesGlb, IsReadBackAsTheSameSurfaces) {
     for (const glm::vec3& p : mesh->positions) EXPECT_LT(fromTorus(p), 0.01);
 }
 
+TEST(SurfacesGlb, StandsOnItsFeet) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle bundle = torusViews(48);
+    // The scene of the other tests, standing on +Z.
+    const glm::dmat3 zUp(1, 0, 0, 0, 0, 1, 0, -1, 0);
+    for (ReferenceView& view : bundle.views) {
+        view.camera.position = zUp * view.camera.position;
+        view.camera.orientation = glm::quat_cast(zUp) * view.camera.orientation;
+    }
+    ASSERT_TRUE(writeSurfaces(folder.path() / "z.glb", bundle, {}, job));
+    EXPECT_EQ(job.takeNotes(), std::vector<std::string>{
+                                   "the model is turned by a node, x y z to x z -y, so that +Y is "
+                                   "up, as it is in glTF"});
+    const auto mesh = readMesh(folder.path() / "z.glb", job);
+    ASSERT_TRUE(mesh) << mesh.error().text();
+    for (const glm::vec3& p : mesh->positions) EXPECT_LT(fromTorus(p), 0.02);
+}
+
+TEST(SurfacesGlb, SaysThatGlassIsOpaque) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle bundle = torusViews(48);
+    for (glm::u8vec4& c : bundle.views[0].texture.rgba8()->pixels())
+        if (c.a > 0) c.a = 128;
+    ASSERT_TRUE(writeSurfaces(folder.path() / "a.glb", bundle, {}, job));
+    EXPECT_EQ(job.takeNotes(),
+              std::vector<std::string>{"translucent surfaces are opaque in the model"});
+}
+
 TEST(SurfacesGlb, IsTheSameFromASpool) {
     const TemporaryFolder folder;
     Job job;
