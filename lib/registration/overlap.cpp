@@ -21,22 +21,19 @@ glm::dvec4 eyeIn(const Pose& frame, const Camera& camera) {
     return {frame.toCamera(camera.position), 1};
 }
 
-/// Whether two eyes, in the space of a view's camera, look at the same side of the surface that
-/// passes a point of it.
-bool seeTheSameSide(const Camera& camera, const GridOfPoints::Point& p, const glm::dvec4& own,
-                    const glm::dvec4& other) {
-    if (!p.onSurface) return false;
-    const double dist = p.own;
-    const auto at = [&](double dx, double dy, double more) {
-        return camera.unproject(p.x + 0.5 + dx, p.y + 0.5 + dy, dist + more);
+/// Whether an eye, in the space of a view's camera, looks at the side that the camera sees of the
+/// surface at pixel position (x, y).
+bool seesTheSameSide(const Camera& camera, double x, double y, const DepthSample& surface,
+                     const glm::dvec4& eye) {
+    const auto at = [&](double dx, double dy) {
+        return camera.unproject(
+            x + dx, y + dy, surface.distance + dx * surface.gradient.x + dy * surface.gradient.y);
     };
-    const glm::dvec3 point = at(0, 0, 0);
-    const glm::dvec3 normal = glm::cross(at(1, 0, p.right - p.own) - point,
-                                         at(0, 1, static_cast<double>(p.below) - dist) - point);
-    const auto side = [&](const glm::dvec4& eye) {
-        return glm::dot(normal, glm::dvec3(eye) - eye.w * point);
-    };
-    return side(own) * side(other) > 0;
+    const glm::dvec3 point = at(0, 0);
+    const glm::dvec3 normal = glm::cross(at(1, 0) - point, at(0, 1) - point);
+    // The camera is at its origin, or looks along -z.
+    const glm::dvec3 own = camera.orthographic ? glm::dvec3(0, 0, 1) : -point;
+    return glm::dot(normal, glm::dvec3(eye) - eye.w * point) * glm::dot(normal, own) > 0;
 }
 
 /// How far a surface may be from what is read between four pixels of it: a quarter of the change of
@@ -89,7 +86,7 @@ CommonPoints commonPoints(const GridOfPoints& from, const Camera& own, const Dep
     CommonPoints out;
     const Camera& other = to.header->camera;
     const Pose source(own), target(other);
-    const glm::dvec4 ownEye = eyeIn(source, own), otherEye = eyeIn(source, other);
+    const glm::dvec4 ownEye = eyeIn(target, own), otherEye = eyeIn(source, other);
     out.asked = static_cast<int>(from.points.size());
     for (const GridOfPoints::Point& p : from.points) {
         const glm::dvec3 inTarget = target.toCamera(
@@ -98,7 +95,10 @@ CommonPoints commonPoints(const GridOfPoints& from, const Camera& own, const Dep
         const glm::dvec3 at = other.project(inTarget);
         const auto there = sampleDepth(*to.depth, at.x, at.y);
         if (!there || !(std::abs(at.z - there->distance) < tolerance * at.z)) continue;
-        if (!seeTheSameSide(own, p, ownEye, otherEye)) continue;
+        const DepthSample surface{p.own, {p.right - p.own, p.below - p.own}};
+        if (!p.onSurface || !seesTheSameSide(own, p.x + 0.5, p.y + 0.5, surface, otherEye) ||
+            !seesTheSameSide(other, at.x, at.y, *there, ownEye))
+            continue;
         out.points.push_back({p.own, at.z, there->distance, bentBetween(*to.depth, at.x, at.y)});
     }
     return out;
