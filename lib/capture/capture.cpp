@@ -387,8 +387,8 @@ std::vector<glm::vec3> drawnPoints(const Mesh& mesh) {
             if (!isStray(i)) addSplat(mesh, mesh.points[i], small, points);
         return points;
     }
-    // Loose points are drawn as discs, which must fit into the frame, too.
-    const float radius = pointRadius(mesh);
+    // Loose points are drawn as discs or balls, which must fit into the frame, too.
+    const float radius = loosePoints(mesh).radius;
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
         if (isStray(mesh.triangles.size() + i)) continue;
         const auto p = mesh.points[i];

@@ -589,8 +589,8 @@ Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
     }
     STX_CHECK(job.limits.checkAllocation(mesh.triangles.size(), sizeof(SetUp), "the mesh"));
     if (!mesh.points.empty()) {
-        const Mesh discs = pointsAsDiscs(mesh, camera, pointRadius(mesh));
-        return Rasterizer(discs, camera, settings).run(settings, job);
+        const Mesh solid = pointsAsTriangles(mesh, camera, loosePoints(mesh));
+        return Rasterizer(solid, camera, settings).run(settings, job);
     }
     return Rasterizer(mesh, camera, settings).run(settings, job);
 }

@@ -35,13 +35,25 @@ struct RasterImage {
 [[nodiscard]] Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
                                             const RasterSettings& settings, Job& job);
 
-/// A mesh without loose points: each became a disc of triangles, facing outward from `viewpoint`
-/// (or, when orthographic, along `-forward`). Meshes without points come back as they are.
-[[nodiscard]] Mesh pointsAsDiscs(const Mesh& mesh, const Camera& camera, float radius);
+/// How the loose points of a mesh are drawn.
+struct LoosePoints {
+    /// Closes the gaps between them, scene units; 0 when the mesh has none.
+    float radius = 0;
+    /// They are too few for that, and stay dots. Dots are balls, which look alike from everywhere:
+    /// of discs that face each camera views deny each other the rims, and surface mode drew a third
+    /// (20.8 instead of 45.1 dB). Where points are dense, discs are nearer to the surface that they
+    /// are of: 22.4 and 28.8 dB for a ball of 3,000 and 30,000 points, 20.3 and 27.4 with bumps.
+    bool apart = false;
+};
 
-/// Radius that closes the gaps between the points of a point cloud: from the distances to the
-/// nearest neighbours; at most the triangles' usual side, where there are some. 0 when the mesh has
-/// no loose points.
-[[nodiscard]] float pointRadius(const Mesh& mesh);
+/// By the distances to the nearest neighbours: a radius of at most the triangles' usual side, where
+/// there are some, and at most a fiftieth of what all are in.
+[[nodiscard]] LoosePoints loosePoints(const Mesh& mesh);
+
+/// A mesh without loose points: each became a disc of triangles, facing outward from the camera's
+/// position (or, when orthographic, along `-forward`), or the half of a ball that faces there.
+/// Meshes without points come back as they are.
+[[nodiscard]] Mesh pointsAsTriangles(const Mesh& mesh, const Camera& camera,
+                                     const LoosePoints& shape);
 
 }  // namespace stx

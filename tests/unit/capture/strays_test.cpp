@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "lib/capture/capture.hpp"
+#include "lib/capture/rasterizer.hpp"
+#include "lib/geometry/depth_code.hpp"
 #include "lib/geometry/view_layout.hpp"
 
 namespace stx {
@@ -43,9 +45,39 @@ TEST(Points, FewBesideFineTrianglesAreAsSmallAsThese) {
         }
     }
     for (const float x : {0.1f, 0.5f, 0.9f}) addPoint(mesh, {x, x, 0.2f});
-    EXPECT_NEAR(pointRadius(mesh), kStep, 1e-4);
+    EXPECT_NEAR(loosePoints(mesh).radius, kStep, 1e-4);
     mesh.triangles.clear();
-    EXPECT_GT(pointRadius(mesh), 1.2f * kStep) << "alone they are larger";
+    EXPECT_GT(loosePoints(mesh).radius, 1.2f * kStep) << "alone they are larger";
+}
+
+// Views of discs, each of which faces its camera, would contradict each other.
+TEST(Points, FewAreBalls) {
+    Mesh mesh;
+    for (const float x : {-1.0f, 0.0f, 1.0f}) addPoint(mesh, {x, 0.3f * x, 0});
+    const float radius = loosePoints(mesh).radius;
+    ViewLayout layout;
+    layout.count = 6;
+    ViewFraming framing;
+    framing.width = framing.height = 256;
+    const auto cameras = layoutCameras(layout, framing, drawnPoints(mesh));
+    ASSERT_TRUE(cameras);
+    Job job;
+    const auto bundle = captureBundle(mesh, *cameras, {}, job);
+    ASSERT_TRUE(bundle);
+    int points = 0;
+    for (const ReferenceView& view : bundle->views)
+        for (int y = 0; y < view.camera.height; ++y)
+            for (int x = 0; x < view.camera.width; ++x) {
+                if (!hasPoint(view.depth.at(x, y))) continue;
+                ++points;
+                double nearest = 1e9;
+                for (const glm::vec3 centre : mesh.positions)
+                    nearest =
+                        std::min(nearest, glm::distance(view.worldPoint(x, y), glm::dvec3(centre)));
+                EXPECT_GT(nearest, 0.92 * radius) << x << ' ' << y;
+                EXPECT_LT(nearest, 1.02 * radius) << x << ' ' << y;
+            }
+    EXPECT_GT(points, 300);
 }
 
 TEST(Strays, OnePointFarOffHidesNothing) {
@@ -53,7 +85,7 @@ TEST(Strays, OnePointFarOffHidesNothing) {
     Mesh mesh = clean;
     addPoint(mesh, {3e5f, 2e5f, 0});
     EXPECT_LT(mesh.bounds().radius(), 2.0);
-    EXPECT_NEAR(pointRadius(mesh), pointRadius(clean), 1e-3);
+    EXPECT_NEAR(loosePoints(mesh).radius, loosePoints(clean).radius, 1e-3);
     ViewLayout layout;
     layout.count = 8;
     ViewFraming framing;

@@ -80,8 +80,8 @@ double shortSide(const Mesh& mesh) {
 
 }  // namespace
 
-float pointRadius(const Mesh& mesh) {
-    if (mesh.points.empty()) return 0.0f;
+LoosePoints loosePoints(const Mesh& mesh) {
+    if (mesh.points.empty()) return {};
     // A single point far off says nothing of how dense the others are.
     const auto bounds = findStrays(mesh.points.size(), [&](std::uint64_t i) {
                             const glm::dvec3 p(mesh.positions[mesh.points[i]]);
@@ -91,7 +91,8 @@ float pointRadius(const Mesh& mesh) {
     // dense as the triangles.
     const double size = bounds.radius() * 2.0;
     const double most = std::min(size * 0.02, shortSide(mesh));
-    if (!(size > 0)) return 0.01f;  // one point, or all in one place: any radius shows it
+    // One point, or all in one place: any radius shows it.
+    if (!(size > 0)) return {0.01f, true};
     // Points lie on surfaces: n of them on a size x size area are size / sqrt(n) apart.
     const double guess = size / std::sqrt(static_cast<double>(mesh.points.size()));
     const PointGrid grid(mesh, guess);
@@ -101,23 +102,29 @@ float pointRadius(const Mesh& mesh) {
         const double d = grid.nearest(mesh.points[i]);
         if (std::isfinite(d)) distances.push_back(d);
     }
-    if (distances.empty()) return static_cast<float>(std::min(guess * 0.5, most));
+    if (distances.empty()) return {static_cast<float>(std::min(guess * 0.5, most)), true};
     // Irregular scans: most gaps are closed by the distance that nine in ten points stay under.
     const auto at = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 9 / 10);
     std::nth_element(distances.begin(), at, distances.end());
     // A handful of points does not make a surface: they stay dots.
-    return static_cast<float>(std::min(*at * std::numbers::sqrt2 * 0.75, most));
+    const double closing = *at * std::numbers::sqrt2 * 0.75;
+    return {static_cast<float>(std::min(closing, most)), closing > most};
 }
 
-Mesh pointsAsDiscs(const Mesh& mesh, const Camera& camera, float radius) {
+Mesh pointsAsTriangles(const Mesh& mesh, const Camera& camera, const LoosePoints& shape) {
     Mesh out = mesh;
     out.points.clear();
     const auto material = static_cast<std::uint32_t>(out.materials.size());
     out.materials.emplace_back();
     out.materials.back().name = "points";
-    constexpr int kCorners = 6;
-    const auto vertices = mesh.points.size() * kCorners;
-    out.positions.reserve(out.positions.size() + vertices);
+    // Rings around the axis towards the camera, by their angle from it, and the pole of a ball.
+    const int corners = shape.apart ? 12 : 6;
+    constexpr double kRight = std::numbers::pi / 2;
+    const std::vector<double> rings = shape.apart
+                                          ? std::vector<double>{kRight, kRight * 2 / 3, kRight / 3}
+                                          : std::vector<double>{kRight};
+    const std::size_t each = static_cast<std::size_t>(corners) * rings.size() + shape.apart;
+    out.positions.reserve(out.positions.size() + mesh.points.size() * each);
     const glm::vec3 forward(camera.forward());
     const glm::vec3 eye(camera.position);
     for (const auto p : mesh.points) {
@@ -129,9 +136,8 @@ Mesh pointsAsDiscs(const Mesh& mesh, const Camera& camera, float radius) {
         const glm::vec3 other = std::abs(axis.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
         const glm::vec3 u = glm::normalize(glm::cross(other, axis)), v = glm::cross(axis, u);
         const auto first = static_cast<std::uint32_t>(out.positions.size());
-        for (int k = 0; k < kCorners; ++k) {
-            const float a = 2.0f * std::numbers::pi_v<float> * k / kCorners;
-            out.positions.push_back(centre + (u * std::cos(a) + v * std::sin(a)) * radius);
+        const auto add = [&](glm::vec3 direction) {
+            out.positions.push_back(centre + direction * shape.radius);
             if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[p]);
             if (!mesh.colours.empty()) out.colours.push_back(mesh.colours[p]);
             if (!mesh.uvs.empty()) out.uvs.push_back(mesh.uvs[p]);
@@ -139,10 +145,33 @@ Mesh pointsAsDiscs(const Mesh& mesh, const Camera& camera, float radius) {
                  {&Mesh::normalUvs, &Mesh::metallicRoughnessUvs, &Mesh::emissiveUvs})
                 if (!(mesh.*uvs).empty()) (out.*uvs).push_back((mesh.*uvs)[p]);
             if (!mesh.tangents.empty()) out.tangents.push_back(mesh.tangents[p]);
-        }
-        for (std::uint32_t k = 2; k < kCorners; ++k) {
-            out.triangles.emplace_back(first, first + k - 1, first + k);
+        };
+        for (const double angle : rings)
+            for (int k = 0; k < corners; ++k) {
+                const float a = 2.0f * std::numbers::pi_v<float> * static_cast<float>(k) /
+                                static_cast<float>(corners);
+                add((u * std::cos(a) + v * std::sin(a)) * static_cast<float>(std::sin(angle)) +
+                    axis * static_cast<float>(std::cos(angle)));
+            }
+        if (shape.apart) add(axis);
+        const auto triangle = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+            out.triangles.emplace_back(first + a, first + b, first + c);
             out.triangleMaterial.push_back(material);
+        };
+        const auto around = static_cast<std::uint32_t>(corners);
+        for (std::uint32_t ring = 0; ring + 1 < rings.size(); ++ring)
+            for (std::uint32_t k = 0; k < around; ++k) {
+                const std::uint32_t next = (k + 1) % around, low = ring * around,
+                                    high = low + around;
+                triangle(low + k, low + next, high + next);
+                triangle(low + k, high + next, high + k);
+            }
+        if (shape.apart) {
+            const std::uint32_t pole = static_cast<std::uint32_t>(each) - 1;
+            for (std::uint32_t k = 0; k < around; ++k)
+                triangle(pole - around + k, pole - around + (k + 1) % around, pole);
+        } else {
+            for (std::uint32_t k = 2; k < around; ++k) triangle(0, k - 1, k);
         }
     }
     return out;
