@@ -113,6 +113,28 @@ TEST_P(ModelGolden, NovelViewsStayAsGood) {
         EXPECT_GT(psnr[w], model.least[w] - kTolerance) << model.name << " " << kWays[w].name;
 }
 
+// Through small openings of a bowl its inner side is seen, by a few views only.
+TEST(Openings, ShowWhatIsBehindThem) {
+    REQUIRE_SHARED(path, "data/meshes/obj/draco/test_nm.obj");
+    const Mesh mesh = meshAt(path);
+    const auto cameras = layoutCameras(*parseViewLayout("octahedral:8"),
+                                       {.width = 128, .height = 128}, mesh.positions);
+    Job job;
+    const auto bundle = captureBundle(mesh, *cameras, {}, job);
+    ASSERT_TRUE(bundle);
+    const auto truth = makeMeshRenderer(mesh, settingsOf(RenderMode::surface, Quality::best), job);
+    const auto renderer = makeRenderer(Backend::cpu, *bundle, kWays[0].settings, -1, job);
+    ASSERT_TRUE(renderer);
+    for (int i = 0; i < 24; ++i) {
+        const Camera camera = around(mesh, 15.0 * i, 192);
+        const Frame expected = *truth->render(camera), drawn = *(*renderer)->render(camera);
+        int open = 0;
+        for (std::size_t k = 0; k < drawn.colour.count(); ++k)
+            open += expected.colour.pixels()[k].a > 0.99f && drawn.colour.pixels()[k].a < 0.5f;
+        EXPECT_LT(open, 28) << "at " << 15 * i << " degrees";
+    }
+}
+
 /// A sphere with detail of all sizes down to the pixels', as photographs have it.
 Mesh texturedSphere() {
     constexpr int kColumns = 128, kRows = 64, kSide = 1024;
