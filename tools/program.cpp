@@ -399,7 +399,7 @@ std::uint64_t bytesOf(const std::filesystem::path& path) {
     std::error_code ec;
     if (std::filesystem::is_regular_file(path, ec)) return std::filesystem::file_size(path, ec);
     std::uint64_t sum = 0;
-    if (frameName(path.filename().string(), 0))
+    if (frameName(path.string(), 0))
         if (const auto files = numberedFiles(path.string()))
             for (const NumberedFile& file : *files) sum += bytesOf(file.path);
     for (auto it = std::filesystem::recursive_directory_iterator(path, ec);
