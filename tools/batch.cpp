@@ -17,6 +17,7 @@
 
 #include "formats/files/pipes.hpp"
 #include "formats/files/temporaries.hpp"
+#include "formats/meshes/text_encoding.hpp"
 #include "lib/base/parallel.hpp"
 #include "tools/stop_signals.hpp"
 
@@ -383,7 +384,8 @@ Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& in
             continue;
         }
         const std::string list = input.substr(1);
-        STX_TRY(const auto bytes, readFile(list, limits));
+        STX_TRY(auto bytes, readFile(list, limits));
+        if (auto plain = utf8FromMarked(bytes)) bytes = std::move(*plain);
         const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
         const auto before = names.size();
         for (std::size_t at = 0; at < text.size();) {

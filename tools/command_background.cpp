@@ -68,10 +68,10 @@ Result<std::vector<MaskTarget>> maskTargets(const BackgroundOptions& o, const Vi
     const std::string pattern = maskPattern(o);
     std::set<std::string> names = {o.output, o.confidence};
     for (int k = first; k < end; ++k) {
-        std::string path = pattern;
+        // The number first: a picture's own name may hold one.
+        std::string path = frameName(pattern, k).value_or(pattern);
         if (const auto at = path.find("{stem}"); at != std::string::npos)
             path.replace(at, 6, frames.name(k));
-        path = frameName(path, k).value_or(path);
         if (!names.insert(path).second)
             return fail(ErrorCode::usage,
                         "two outputs have the name '{}'; give masks names of their own by "

@@ -199,7 +199,7 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
     }
     const auto imported = std::make_shared<bool>(false);
     STX_TRY(auto frames, openSequence(input, openOptions(o, imported), program.job));
-    const bool numbered = frameName(target.filename().string(), 0).has_value();
+    const bool numbered = frameName(target.string(), 0).has_value();
     if (!frames->timeline().moves() && !numbered) {
         // What stands still goes the way that meshes and atlases take, too: no pixel has been read.
         (void)program.job.takeNotes();
@@ -240,12 +240,29 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
     return done;
 }
 
+/// Errors (usage) for --frame of a film that is not an image set: its first frame would be taken.
+Result<void> checkFrame(const std::filesystem::path& input, const ConvertOptions& o,
+                        Program& program) {
+    if (!o.frameGiven || !o.open.set.from.empty()) return {};
+    const auto kind = recognise(input);
+    if (!kind || (*kind != FileKind::mpeg4 && *kind != FileKind::numbered)) return {};
+    Job quiet;  // notes come with the conversion
+    quiet.workFor(program.job);
+    STX_TRY(const auto frames, openSequence(input, o.open, quiet));
+    if (!frames->timeline().moves()) return {};
+    return fail(ErrorCode::usage,
+                "--frame is of image sets, and '{}' is {}; -o 'name_%04d.exr' writes all of its "
+                "frames, and stx extract --time T one moment as a set",
+                input.string(), nameOf(*kind));
+}
+
 Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
                                           const std::filesystem::path& target,
                                           const ConvertOptions& o, Program& program) {
     const Stopwatch watch;
     STX_CHECK(checkTarget(target, program));
     STX_CHECK(containerOf(target));
+    STX_CHECK(checkFrame(input, o, program));
     // Only the report has the points, for which the images must be decoded.
     const bool countPoints = !program.common.report.empty();
     std::optional<Converted> done;

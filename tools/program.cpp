@@ -399,7 +399,7 @@ std::uint64_t bytesOf(const std::filesystem::path& path) {
     std::error_code ec;
     if (std::filesystem::is_regular_file(path, ec)) return std::filesystem::file_size(path, ec);
     std::uint64_t sum = 0;
-    if (frameName(path.filename().string(), 0))
+    if (frameName(path.string(), 0))
         if (const auto files = numberedFiles(path.string()))
             for (const NumberedFile& file : *files) sum += bytesOf(file.path);
     for (auto it = std::filesystem::recursive_directory_iterator(path, ec);
@@ -417,6 +417,11 @@ Result<std::string> folderTarget(const std::string& target, const std::vector<st
         ".bt",   ".xmt", ".json", ".txt", ".obj",  ".glb",  ".gltf", ".stl", ".ply", ".drc",
         ".html", ".off", ".dae",  ".fbx", ".zip",  ".tar",  ".gz",   ".yuv", ".y4m", ".pfm",
         ".bin",  ".tga", ".bmp",  ".gif", ".psd",  ".mkv",  ".mov",  ".avi", ".webm"};
+    if (target == "-")
+        return fail(ErrorCode::usage,
+                    "-o is '-', standard output, which takes one stream; {} is expected (-o ./- "
+                    "is a folder of that name)",
+                    expected);
     std::string path = target;
     while (path.size() > 1 && path.back() == '/') path.pop_back();
     std::error_code ec;

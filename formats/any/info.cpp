@@ -430,7 +430,7 @@ Result<void> describeMesh(const fs::path& path, const InfoOptions& options, Json
 }
 
 /// What commands take of an image set at a moment, as far as that shows before it is read.
-Result<Json> memoryOfSet(const fs::path& path, Job& job) {
+Result<Json> memoryOfSet(const fs::path& path, std::size_t frames, Job& job) {
     Job quiet;  // it has been described
     quiet.workFor(job);
     STX_TRY(const auto set, summariseImageSet(path, quiet));
@@ -446,7 +446,7 @@ Result<Json> memoryOfSet(const fs::path& path, Job& job) {
         alone = alone && !view.panorama && !view.video;
     }
     const bool onDemand = alone && views.size() > 1 && bytes > heldWhole(job.limits);
-    return memoryOfSizes(views, onDemand, job.limits);
+    return memoryOfSizes(views, frames, onDemand, job.limits);
 }
 
 /// What takes more than headers: what of the pixels was asked for.
@@ -463,10 +463,11 @@ Result<void> addMeasured(const fs::path& path, FileKind kind, const InfoOptions&
     if (options.memory) {
         const auto memory = [&]() -> Result<Json> {
             const bool onDemand = kind == FileKind::mpeg4 || out["container"] == "exr";
-            if (kind == FileKind::imageSet) return memoryOfSet(path, job);
-            if (!onDemand) return memoryOfSizes(out["views"], false, job.limits);
+            const auto frames = out.value("frames", std::size_t{1});
+            if (kind == FileKind::imageSet) return memoryOfSet(path, frames, job);
+            if (!onDemand) return memoryOfSizes(out["views"], frames, false, job.limits);
             STX_TRY(const auto table, openViews(path, open, job));
-            return memoryJson(*table, job);
+            return memoryJson(*table, frames, job);
         };
         STX_TRY(out["memory"], within(fmt::format("'{}'", path.string()), memory()));
     }

@@ -10,6 +10,7 @@
 #include "lib/quality/prune_quality.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
+#include "lib/sheet/sheet.hpp"
 #include "lib/splats/from_bundle.hpp"
 
 namespace stx {
@@ -23,6 +24,7 @@ struct ViewCommand {
     enum class Looks {
         atEach,       ///< one at a time, where they come on demand
         atRefined,    ///< the same; where they are refined before, from a spool if that takes less
+        onSheet,      ///< the same, beside the sheet
         whilePacked,  ///< the same, beside the atlas
         whilePruned,  ///< the same, after pictures of all
         whileRefined,
@@ -41,7 +43,7 @@ constexpr ViewCommand kCommands[] = {
     {"bake -o NAME.exr", &peak::kBake, &peak::kBake, atEach},
     {"bake -o NAME.mp4", &peak::kBakeToMpeg4, &peak::kBakeToMpeg4, atEach},
     {"extract -o FOLDER", &peak::kExport, &peak::kExport, atRefined},
-    {"sheet", &peak::kSheet, &peak::kSheet, atRefined},
+    {"sheet", &peak::kSheet, &peak::kSheet, onSheet},
     {"render", &peak::kSurfaceMode, &peak::kSurfaceMode, atAll},
     {"render --mode splat", &peak::kSplatMode, &peak::kSplatMode, atAll},
     {"render --light", &peak::kLitSurfaceMode, &peak::kLitSurfaceMode, atAll},
@@ -59,9 +61,10 @@ constexpr ViewCommand kCommands[] = {
 /// What commands take of views that may be refined before.
 class MemoryOfCommands {
   public:
-    MemoryOfCommands(const ViewTable& table, bool refines, const Limits& limits)
+    MemoryOfCommands(const ViewTable& table, std::size_t frames, bool refines, const Limits& limits)
         : table_(table),
           limits_(limits),
+          frames_(frames),
           refines_(refines),
           onDemand_(!table.whole()),
           refiningAll_(memoryOfAll(table, peak::kRefine)),
@@ -81,6 +84,11 @@ class MemoryOfCommands {
                 return each(takes, onDemand_);
             case atRefined:
                 return withRefining(each(takes, onDemand_ && (!refines_ || spooled_)));
+            case onSheet: {
+                Takes views = each(takes, onDemand_ && (!refines_ || spooled_));
+                views.bytes += memoryOfSheet(table_, frames_);
+                return withRefining(views);
+            }
             case whilePacked:
                 return withRefining(packed(takes));
             case whilePruned:
@@ -142,15 +150,17 @@ class MemoryOfCommands {
 
     const ViewTable& table_;
     const Limits& limits_;
+    std::size_t frames_;
     bool refines_, onDemand_;
     std::uint64_t refiningAll_, refining_;
     bool spooled_ = false;  ///< they are refined in a spool
 };
 
-nlohmann::ordered_json memoryOf(const ViewTable& table, bool refines, const Limits& limits) {
+nlohmann::ordered_json memoryOf(const ViewTable& table, std::size_t frames, bool refines,
+                                const Limits& limits) {
     const bool vectors = std::ranges::any_of(
         table.kinds(), [](const ViewImageKinds& k) { return k.normal || k.splatU || k.splatV; });
-    const MemoryOfCommands memory(table, refines, limits);
+    const MemoryOfCommands memory(table, frames, refines, limits);
     auto commands = nlohmann::ordered_json::array();
     for (const ViewCommand& command : kCommands) {
         const auto takes = memory.of(command, vectors ? *command.takesWithVectors : *command.takes);
@@ -177,12 +187,13 @@ class SizesAlone : public ViewTable {
 
 }  // namespace
 
-Result<nlohmann::ordered_json> memoryJson(const ViewTable& table, Job& job) {
+Result<nlohmann::ordered_json> memoryJson(const ViewTable& table, std::size_t frames, Job& job) {
     STX_TRY(const bool refines, mayRefine(table, RefineSettings(), job));
-    return memoryOf(table, refines, job.limits);
+    return memoryOf(table, frames, refines, job.limits);
 }
 
-Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views, bool onDemand,
+Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views,
+                                             std::size_t frames, bool onDemand,
                                              const Limits& limits) {
     Bundle sizes;
     for (const auto& view : views) {
@@ -195,9 +206,9 @@ Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views
                         "memory that it takes is not, either; leave out --memory",
                         view.value("name", ""));
     }
-    if (!onDemand) return memoryOf(*viewsOf(sizes), true, limits);
+    if (!onDemand) return memoryOf(*viewsOf(sizes), frames, true, limits);
     std::vector<ViewImageKinds> kinds(sizes.views.size());
-    return memoryOf(SizesAlone(std::move(sizes), std::move(kinds)), true, limits);
+    return memoryOf(SizesAlone(std::move(sizes), std::move(kinds)), frames, true, limits);
 }
 
 std::string memoryText(const nlohmann::ordered_json& memory) {

@@ -11,13 +11,16 @@ namespace stx {
 
 /// The memory that each command takes at most on these views, by tools/schemas/info.schema.json, as
 /// its own check against the limit counts it (lib/model/peak_memory.hpp). Views on demand are read
-/// once, one for each thread, to find whether they would be refined. Errors: reading.
-[[nodiscard]] Result<nlohmann::ordered_json> memoryJson(const ViewTable& table, Job& job);
+/// once, one for each thread, to find whether they would be refined. `frames`: of a film, of which
+/// these are the first. Errors: reading.
+[[nodiscard]] Result<nlohmann::ordered_json> memoryJson(const ViewTable& table, std::size_t frames,
+                                                        Job& job);
 
 /// Of views of which only the sizes are known, those of the field "views", which may be refined.
 /// `onDemand`: they are read when they are asked for. Errors (invalidInput): a size is not known.
 [[nodiscard]] Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views,
-                                                           bool onDemand, const Limits& limits);
+                                                           std::size_t frames, bool onDemand,
+                                                           const Limits& limits);
 
 /// The same for people, a row for each command.
 [[nodiscard]] std::string memoryText(const nlohmann::ordered_json& memory);

@@ -48,8 +48,7 @@ bool isExrBundleFile(const fs::path& path) {
 
 /// Of a name that no file has: whether it is the pattern of a film.
 Result<bool> namesFilm(const fs::path& path) {
-    const std::string name = path.filename().string();
-    if (!frameName(name, 0)) return false;
+    if (!frameName(path.string(), 0)) return false;
     STX_CHECK(checkPattern(path.string()));
     auto files = numberedFiles(path.string());
     if (path.extension() == ".exr" && !files) return propagate(files);

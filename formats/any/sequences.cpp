@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 constexpr double kUsualRate = 25;  ///< frames a second, where files do not tell their times
 
 bool isNumberedExr(const fs::path& path) {
-    const auto one = frameName(path.filename().string(), 0);
+    const auto one = frameName(path.string(), 0);
     return one && fs::path(*one).extension() == ".exr";
 }
 

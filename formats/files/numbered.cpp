@@ -8,21 +8,37 @@
 namespace stx {
 namespace {
 
+/// Where the name of a pattern's file, or of its last folder, begins and ends.
+struct LastName {
+    std::size_t begin = 0, end = 0;
+};
+LastName lastNameOf(std::string_view pattern) {
+    LastName name{0, pattern.size()};
+    while (name.end > 0 && pattern[name.end - 1] == '/') --name.end;
+    const auto slash = pattern.substr(0, name.end).rfind('/');
+    if (slash != std::string_view::npos) name.begin = slash + 1;
+    return name;
+}
+
 /// `%04d` in a pattern.
 struct Placeholder {
     std::size_t begin = 0, end = 0;
     int width = 0;
 };
 
-std::optional<Placeholder> placeholderOf(const std::string& pattern) {
-    const auto percent = pattern.find('%');
-    if (percent == std::string::npos) return std::nullopt;
-    std::size_t at = percent + 1;
-    int width = 0;
-    while (at < pattern.size() && pattern[at] >= '0' && pattern[at] <= '9' && at - percent < 4)
-        width = width * 10 + (pattern[at++] - '0');
-    if (at >= pattern.size() || pattern[at] != 'd') return std::nullopt;
-    return Placeholder{percent, at + 1, width};
+/// The first at `from` or behind, in the last name only.
+std::optional<Placeholder> placeholderOf(std::string_view pattern, std::size_t from = 0) {
+    const LastName name = lastNameOf(pattern);
+    pattern = pattern.substr(0, name.end);
+    for (auto percent = pattern.find('%', std::max(from, name.begin)); percent != pattern.npos;
+         percent = pattern.find('%', percent + 1)) {
+        std::size_t at = percent + 1;
+        int width = 0;
+        while (at < pattern.size() && pattern[at] >= '0' && pattern[at] <= '9' && at - percent < 4)
+            width = width * 10 + (pattern[at++] - '0');
+        if (at < pattern.size() && pattern[at] == 'd') return Placeholder{percent, at + 1, width};
+    }
+    return std::nullopt;
 }
 
 }  // namespace
@@ -35,15 +51,14 @@ std::optional<std::string> frameName(const std::string& pattern, int frame) {
 }
 
 Result<void> checkPattern(const std::string& pattern) {
-    if (const auto place = placeholderOf(pattern);
-        place && placeholderOf(pattern.substr(place->end)))
+    if (const auto place = placeholderOf(pattern); place && placeholderOf(pattern, place->end))
         return fail(ErrorCode::usage,
                     "'{}' has several numbers; one is possible, as in name_%04d.png", pattern);
     return {};
 }
 
 Result<std::vector<NumberedFile>> numberedFiles(const std::string& pattern) {
-    const std::filesystem::path path(pattern);
+    const std::filesystem::path path(pattern.substr(0, lastNameOf(pattern).end));
     const std::string name = path.filename().string();
     const auto place = placeholderOf(name);
     std::vector<NumberedFile> files;

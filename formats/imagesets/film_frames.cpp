@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
@@ -188,6 +189,13 @@ Result<std::vector<FramePair>> pairFrames(const Film& colour, const Film& depth,
             fmt::format("{}: {} of {} frames of depth are left out, as no frame of colour is "
                         "of their time",
                         where, dt.size() - pairs.size(), dt.size()));
+    std::set<int> shown;
+    for (const FramePair& pair : pairs) shown.insert(pair.colour);
+    if (shown.size() < ct.size())
+        job.note(
+            fmt::format("{}: {} of {} frames of colour are left out, as no frame of depth is "
+                        "of their time",
+                        where, ct.size() - shown.size(), ct.size()));
     return pairs;
 }
 

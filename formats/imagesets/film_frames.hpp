@@ -16,8 +16,8 @@ struct FramePair {
 
 /// Pairs by time: to each time of depth the nearest of colour, within half a frame of colour. Where
 /// films have as many frames and their clocks do not agree, one by one, with a note; frames of
-/// depth without colour are left out, with a note. `where` is for messages. Errors (invalidInput):
-/// no pair.
+/// depth without colour and of colour without depth are left out, with a note. `where` is for
+/// messages. Errors (invalidInput): no pair.
 [[nodiscard]] Result<std::vector<FramePair>> pairFrames(const Film& colour, const Film& depth,
                                                         const std::string& where, Job& job);
 

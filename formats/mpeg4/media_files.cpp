@@ -9,6 +9,7 @@
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
+#include "lib/base/code_point.hpp"
 #include "lib/geometry/directions.hpp"
 
 namespace stx::mpeg4 {
@@ -320,6 +321,29 @@ std::vector<std::string> mediaFileNames(const Document& document) {
         });
     (void)added;  // the body never fails
     return names;
+}
+
+std::string mediaFolderName(const std::filesystem::path& text) {
+    const std::string stem = text.stem().string();
+    const std::string_view whole = stem;
+    const auto digit = [&](std::size_t at) {
+        return at < whole.size() &&
+               ((whole[at] >= '0' && whole[at] <= '9') || (whole[at] >= 'A' && whole[at] <= 'F'));
+    };
+    std::string name;
+    for (std::size_t at = 0; at < whole.size();) {
+        const auto [value, bytes] = firstCodePoint(whole.substr(at));
+        const bool control = value < 0x20 || value == 0x7f;
+        const bool special = value == '%' || value == '#' || value == ':';
+        const bool coded = value == '=' && digit(at + 1) && digit(at + 2);
+        if (bytes == 0 || control || special || coded)
+            name += fmt::format("={:02X}", static_cast<unsigned char>(whole[at++]));
+        else {
+            name += whole.substr(at, bytes);
+            at += bytes;
+        }
+    }
+    return name + "_images";
 }
 
 }  // namespace stx::mpeg4

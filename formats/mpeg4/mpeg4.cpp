@@ -24,11 +24,6 @@ std::string_view textOf(ByteSpan bytes) {
     return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// The folder of a path, "." where it has none.
-std::string imagesFolderName(const std::filesystem::path& path) {
-    return path.stem().string() + "_images";
-}
-
 /// Files in a folder that an earlier text's images left there, by the names that we give.
 std::vector<std::string> earlierImages(const std::filesystem::path& folder) {
     std::vector<std::string> names;
@@ -50,7 +45,7 @@ Result<void> writeText(const Document& source, const std::filesystem::path& path
                        Mpeg4Container container, Job& job, const OutputFile::Options& options) {
     Document document = source;
     const auto names = mediaFileNames(document);
-    const std::string folderName = imagesFolderName(path);
+    const std::string folderName = mediaFolderName(path);
     struct Part {
         ElementaryStream* stream;
         std::string name;

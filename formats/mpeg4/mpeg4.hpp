@@ -32,8 +32,8 @@ struct Mpeg4WriteOptions {
 };
 
 /// Writes a presentation into the container of the path's ending, whole or not at all. Beside
-/// `name.bt` and `name.xmt` is the folder `name_images` with the streams' bytes, untouched: images
-/// as files, all else (needsTrackFile) as an .mp4 with one track.
+/// `name.bt` and `name.xmt` is the folder `name_images` (mediaFolderName) with the streams' bytes,
+/// untouched: images as files, all else (needsTrackFile) as an .mp4 with one track.
 /// Errors: (usage) another ending, or a text for stdout that has images; (io); what the writers
 /// say.
 [[nodiscard]] Result<void> writeMpeg4(const Mpeg4Document& document,

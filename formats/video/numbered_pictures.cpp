@@ -99,7 +99,7 @@ Result<std::vector<NumberedFile>> numberedPictures(const fs::path& folder, Job& 
 }
 
 bool isSequencePattern(const fs::path& pattern) {
-    return frameName(pattern.filename().string(), 0).has_value();
+    return frameName(pattern.string(), 0).has_value();
 }
 
 Result<std::vector<NumberedFile>> picturesOfPattern(const fs::path& pattern, Job& job) {

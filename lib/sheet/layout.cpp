@@ -109,7 +109,7 @@ Result<SheetPlan> planSheet(const SheetContent& content, const SheetSettings& se
     }
     STX_CHECK(limits.checkAllocation(
         static_cast<std::uint64_t>(best.size.x) * static_cast<std::uint64_t>(best.size.y),
-        sizeof(glm::u8vec3) * 2, "the sheet"));
+        SheetPlan::kBytesPerPixel, "the sheet"));
     return best;
 }
 

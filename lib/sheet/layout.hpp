@@ -36,6 +36,12 @@ struct SheetPlan {
     glm::ivec2 group{1};  ///< room of each group, pixels
     glm::ivec2 size{1};   ///< of the sheet, pixels
 
+    /// Of memory, that the sheet takes with its pictures.
+    [[nodiscard]] std::uint64_t bytes() const {
+        return static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
+               kBytesPerPixel;
+    }
+    static constexpr std::uint64_t kBytesPerPixel = sizeof(glm::u8vec3) * 2;
     /// The number of the group at place `i` (below `shown`): evenly spread when not all fit.
     [[nodiscard]] int groupAt(int i) const {
         return static_cast<int>(static_cast<std::int64_t>(i) * content.groups / shown);

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "lib/base/counted.hpp"
@@ -94,21 +95,39 @@ Tile withRectangles(Tile tile, const Atlas& atlas, int page) {
     return tile;
 }
 
+/// What a sheet of views has on it.
+SheetContent contentOf(const ViewTable& table) {
+    const auto some = [&](auto of) { return std::ranges::any_of(table.kinds(), of); };
+    SheetContent content;
+    content.groups = static_cast<int>(table.count());
+    content.tiles = 2;
+    for (const bool also :
+         {some(&ViewImageKinds::normal), some(&ViewImageKinds::hasSplats),
+          some(&ViewImageKinds::metallicRoughness), some(&ViewImageKinds::emissive)})
+        content.tiles += also ? 1 : 0;
+    content.lines = kViewLines;
+    content.headerLines = 2;
+    content.largest = largestOf(table.about().views);
+    return content;
+}
+
+/// What a sheet of moments has on it; `groups`: views at a moment.
+SheetContent contentOfMoments(const Bundle& first, int groups) {
+    SheetContent content;
+    content.groups = groups;
+    content.tiles = 2;
+    content.lines = 2;
+    content.headerLines = 2;
+    content.largest = largestOf(first.views);
+    content.what = "views at a time";
+    return content;
+}
+
 }  // namespace
 
 Result<Sheet> sheetOf(const ViewTable& table, const SheetSettings& settings, Job& job) {
     const Bundle& bundle = table.about();
-    const auto some = [&](auto of) { return std::ranges::any_of(table.kinds(), of); };
-    const bool normals = some(&ViewImageKinds::normal), splats = some(&ViewImageKinds::hasSplats);
-    const bool surface = some(&ViewImageKinds::metallicRoughness);
-    const bool glow = some(&ViewImageKinds::emissive);
-    SheetContent content;
-    content.groups = static_cast<int>(bundle.views.size());
-    content.tiles = 2 + (normals ? 1 : 0) + (splats ? 1 : 0) + (surface ? 1 : 0) + (glow ? 1 : 0);
-    content.lines = kViewLines;
-    content.headerLines = 2;
-    content.largest = largestOf(bundle.views);
-    STX_TRY(const auto plan, planSheet(content, settings, job.limits));
+    STX_TRY(const auto plan, planSheet(contentOf(table), settings, job.limits));
     std::vector<SheetGroup> groups(static_cast<std::size_t>(plan.shown));
     std::vector<int> places(table.count(), -1);  // of those that are shown
     for (int i = 0; i < plan.shown; ++i) places[plan.groupAt(i)] = i;
@@ -117,7 +136,7 @@ Result<Sheet> sheetOf(const ViewTable& table, const SheetSettings& settings, Job
                           const std::shared_ptr<const ReferenceView>& read) -> Result<void> {
         const ReferenceView& view = *read;
         points += view.pointCount();
-        job.progress(++done, content.groups, "views");
+        job.progress(++done, plan.content.groups, "views");
         if (places[number] < 0) return {};
         SheetGroup& group = groups[places[number]];
         group.lines = viewLines(view, number, bundle.origin);
@@ -131,12 +150,27 @@ Result<Sheet> sheetOf(const ViewTable& table, const SheetSettings& settings, Job
         return {};
     };
     STX_CHECK(forEachView(table, peak::kSheet, job, draw));
+    const bool second =
+        std::ranges::any_of(table.kinds(), [](const auto& k) { return k.normal || k.hasSplats(); });
     const auto header =
         headerOf(plan, settings,
-                 fmt::format("{}, {}, {}", normals || splats ? "SimpleTextureV2" : "SimpleTexture",
+                 fmt::format("{}, {}, {}", second ? "SimpleTextureV2" : "SimpleTexture",
                              counted(bundle.views.size(), "view"),
                              counted(static_cast<std::size_t>(points.load()), "point")));
-    return Sheet{drawSheet(plan, header, groups), plan.shown, content.groups};
+    return Sheet{drawSheet(plan, header, groups), plan.shown, plan.content.groups};
+}
+
+std::uint64_t memoryOfSheet(const ViewTable& first, std::size_t frames) {
+    SheetSettings settings;
+    SheetContent content = contentOf(first);
+    if (frames > 1) {
+        settings.columns = static_cast<int>(std::min<std::size_t>(frames, kMoments));
+        content = contentOfMoments(first.about(), content.groups * settings.columns);
+    }
+    Limits none;
+    none.maxMemoryBytes = std::numeric_limits<std::uint64_t>::max();
+    const auto plan = planSheet(content, settings, none);
+    return plan ? plan->bytes() : 0;
 }
 
 Result<Sheet> sheetOf(const Atlas& atlas, const SheetSettings& settings, Job& job) {
@@ -267,17 +301,11 @@ Result<Sheet> sheetOf(Sequence& frames, const SheetSettings& settings, Job& job)
     if (std::ranges::any_of(first.views, &ReferenceView::background)) table.reset();
     STX_TRY(const auto stands, stillBackgrounds(frames, first, job));
     const auto wanted = rowsOfViews(stands, moments);
-    SheetContent content;
-    content.groups = 0;
-    for (const auto& row : wanted) content.groups += static_cast<int>(row.size());
-    content.tiles = 2;
-    content.lines = 2;
-    content.headerLines = 2;
-    content.largest = largestOf(first.views);
-    content.what = "views at a time";
+    int cellsWanted = 0;
+    for (const auto& row : wanted) cellsWanted += static_cast<int>(row.size());
     SheetSettings fixed = settings;
     fixed.columns = moments;
-    STX_TRY(auto plan, planSheet(content, fixed, job.limits));
+    STX_TRY(auto plan, planSheet(contentOfMoments(first, cellsWanted), fixed, job.limits));
     const auto cells = shownCells(wanted, plan.shown, moments);
     plan.shown = static_cast<int>(cells.size());
     std::vector<SheetGroup> groups(cells.size());
@@ -330,7 +358,7 @@ Result<Sheet> sheetOf(Sequence& frames, const SheetSettings& settings, Job& job)
                     counted(static_cast<std::size_t>(moments), "moment"),
                     counted(timeline.count(), "frame"), timeline.duration(), counted(views, "view"),
                     counted(static_cast<std::size_t>(points.load()), "point")));
-    return Sheet{drawSheet(plan, header, groups), plan.shown, content.groups};
+    return Sheet{drawSheet(plan, header, groups), plan.shown, plan.content.groups};
 }
 
 }  // namespace stx

@@ -36,6 +36,11 @@ struct Sheet {
 [[nodiscard]] Result<Sheet> sheetOf(const ViewTable& table, const SheetSettings& settings,
                                     Job& job);
 
+/// The bytes that such a sheet takes as a picture with SheetSettings(), beside the views that are
+/// looked at; of a film of more than one frame its sheet of moments, `first` being the first. 0
+/// where a sheet would be an error.
+[[nodiscard]] std::uint64_t memoryOfSheet(const ViewTable& first, std::size_t frames);
+
 /// The textures of an atlas, with the rectangles and the numbers of their views drawn on them.
 [[nodiscard]] Result<Sheet> sheetOf(const Atlas& atlas, const SheetSettings& settings, Job& job);
 

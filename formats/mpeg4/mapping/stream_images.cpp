@@ -33,6 +33,26 @@ bool isVideo(const ElementaryStream& stream) {
            stream.objectTypeIndication != oti::kPng;
 }
 
+/// Bits of a value of video's luma, where its decoder's configuration tells; else 8.
+/// AVCDecoderConfigurationRecord and HEVCDecoderConfigurationRecord: ISO/IEC 14496-15, 5.3.3.1.2
+/// and 8.3.3.1.2.
+int lumaBits(const ElementaryStream& stream) {
+    const Bytes& record = stream.decoderSpecificInfo;
+    const auto at = [&](std::size_t place) {
+        return place < record.size() ? std::to_integer<unsigned>(record[place]) : 0u;
+    };
+    if (stream.objectTypeIndication == oti::kHevc) return 8 + static_cast<int>(at(17) & 7);
+    if (stream.objectTypeIndication != oti::kAvc) return 8;
+    // Behind the sequence's and the picture's parameters, in profiles that have other depths.
+    std::size_t place = 5;
+    for (const unsigned mask : {0x1Fu, 0xFFu}) {
+        const unsigned sets = at(place++) & mask;
+        for (unsigned i = 0; i < sets; ++i) place += 2 + at(place) * 256 + at(place + 1);
+    }
+    const bool tells = at(1) == 100 || at(1) == 110 || at(1) == 122 || at(1) == 244;
+    return tells ? 8 + static_cast<int>(at(place + 1) & 7) : 8;
+}
+
 }  // namespace
 
 bool holdsVideo(const Document& document) {
@@ -223,9 +243,9 @@ Result<ImageInfo> StreamImages::probe(const Node& texture) const {
         const auto& image = texture.get<PixelImage>("image");
         return ImageInfo{"pixels", image.width, image.height, image.components, 8};
     }
-    // What video is coded in, only its decoder knows; its track tells its size.
+    // Which channels video has, only its decoder knows; its track tells its size.
     if (const ElementaryStream* from = stream(texture); from && isVideo(*from) && from->width > 0)
-        return ImageInfo{"video", from->width, from->height, 1, 8};
+        return ImageInfo{"video", from->width, from->height, 1, lumaBits(*from) > 8 ? 16 : 8};
     // Headers are at the front, but for a JPEG with much metadata.
     if (const ElementaryStream* from = stream(texture); from && !from->samples.empty()) {
         ByteRange head = from->samples[sampleAt(texture, *from)].data;

@@ -105,6 +105,11 @@ TEST(FilmPairs, FramesAreMatchedByTime) {
     const auto colours = films::picture(kWidth, kHeight, 4);
     EXPECT_NEAR(bundle->views[0].texture.rgba8()->at(9, 9).b, colours.at(9, 9).b, 3);
     EXPECT_NEAR(bundle->views[0].depth.at(9, 9), films::code(9, 9, 2, 4000) * 0.001, 1e-3);
+    const auto notes = job.takeNotes();
+    EXPECT_TRUE(std::ranges::any_of(notes, [](const std::string& note) {
+        return note.find(fmt::format("{} of {} frames of colour are left out", kFrames - 4,
+                                     kFrames)) != std::string::npos;
+    })) << fmt::format("{}", fmt::join(notes, "\n"));
 }
 
 TEST(FilmPairs, GoOnWhereAPictureIsDamaged) {

@@ -52,6 +52,30 @@ TEST(Mpeg4Files, ABundleIsTheSameFromEveryContainer) {
     EXPECT_TRUE(fs::exists(folder / "a_images" / "view1_texture.png"));
 }
 
+/// Readers of names in texts know `%d`, `FILE.mp4#TRACK` and URLs.
+TEST(Mpeg4Files, TextsOfAnyNameAreReadBack) {
+    const TemporaryFolder folder("stems");
+    Job job;
+    for (const std::string stem : {"100%done", "50%", "a#1", "run1:take2", "q\"<&>'", "b\\s",
+                                   "e=23", "nl\n\x01", "\xc3\xbc", "\xff"})
+        for (const char* ending : {".bt", ".xmt"}) {
+            const auto path = folder / (stem + ending);
+            mustWrite(writeMpeg4Views(*viewsOf(twoViews()), path, job));
+            const auto back = readMpeg4Bundle(path, job);
+            EXPECT_TRUE(back) << back.error().text();
+            fs::remove_all(folder / mediaFolderName(path));
+        }
+}
+
+TEST(Mpeg4Files, FoldersOfImagesDifferWhereTextsDo) {
+    EXPECT_EQ(mediaFolderName("c/a.v2.bt"), "a.v2_images");
+    EXPECT_EQ(mediaFolderName("t=0.5 \xc3\xbc.bt"), "t=0.5 \xc3\xbc_images");
+    EXPECT_EQ(mediaFolderName("a#1.bt"), "a=231_images");
+    EXPECT_EQ(mediaFolderName("a=231.bt"), "a=3D231_images");
+    EXPECT_EQ(mediaFolderName("50%.bt"), "50=25_images");
+    EXPECT_EQ(mediaFolderName("a:\n\xff.bt"), "a=3A=0A=FF_images");
+}
+
 TEST(Mpeg4Files, Mp4ThroughATextIsTheSameFile) {
     const TemporaryFolder folder("roundtrip");
     Job job;

@@ -91,6 +91,18 @@ TEST(Sheet, IsNoLargerThanAskedFor) {
     }
 }
 
+TEST(Sheet, ItsMemoryIsKnownBefore) {
+    Job job;
+    for (const int views : {1, 7, 100}) {
+        const Bundle bundle = evenBundle(views, 24);
+        const auto table = viewsOf(bundle);
+        const auto sheet = sheetOf(*table, {}, job);
+        ASSERT_TRUE(sheet) << sheet.error().text();
+        EXPECT_EQ(memoryOfSheet(*table, 1), sheet->picture.count() * 6);
+        EXPECT_NE(memoryOfSheet(*table, 9), memoryOfSheet(*table, 1));
+    }
+}
+
 TEST(Sheet, ShowsAsManyViewsAsFitAndSaysSo) {
     Job job;
     SheetSettings settings;
