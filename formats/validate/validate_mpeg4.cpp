@@ -227,7 +227,7 @@ class DocumentValidator {
                 ++index;
             }
         }
-        checkBackgrounds(shown->backgrounds, *images_, findings_);
+        checkBackgrounds(shown->backgrounds, pictures());
         checkMasks(shown->infos, pictures());
         // A place without an object is a scene, too.
         if (index == 0 && shown->backgrounds.empty())

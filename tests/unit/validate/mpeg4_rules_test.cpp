@@ -329,6 +329,27 @@ TEST(Validate, ImagesOfAnOctreeImageAreDecoded) {
     EXPECT_EQ(numbersWith(document, false), Numbers{});
 }
 
+TEST(Validate, PicturesOfABackgroundAreDecoded) {
+    Bundle bundle;
+    bundle.views = {makeView(4, 4, 8)};
+    Environment e;
+    e.pictures.assign(6, Texture(Rgba8Image(4, 4, glm::u8vec4(255))));
+    bundle.environment = std::make_shared<const Environment>(e);
+    Document document = sceneOf(bundle);
+    EXPECT_EQ(numbersWith(document, true), Numbers{});
+    int cut = 0;
+    for (const NodePtr& node : rootOf(document)->get<NodeList>("children"))
+        if (node->is("Background"))
+            for (ObjectDescriptor& od : odsOf(document))
+                if (od.id == node->get<std::vector<Url>>("leftUrl").at(0).objectDescriptorId) {
+                    cutPicture(od.streams.at(0));
+                    ++cut;
+                }
+    ASSERT_EQ(cut, 1);
+    EXPECT_EQ(numbersWith(document, true), Numbers{4005});
+    EXPECT_EQ(numbersWith(document, false), Numbers{});
+}
+
 TEST(Validate, MasksInWorldInfoAreDecoded) {
     const std::vector<std::uint8_t> grey(48, 0);
     const Bytes png = *encodePng(8, 6, 1, 8, grey.data(), false);
