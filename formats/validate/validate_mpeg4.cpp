@@ -82,7 +82,6 @@ class DocumentValidator {
     }
 
     // ---- Descriptors
-    static std::string odName(int id) { return fmt::format("object descriptor {}", id); }
     void checkDescriptors() {
         std::set<std::uint32_t> esIds;
         const auto checkEsId = [&](const ElementaryStream& stream, const std::string& where) {
@@ -109,12 +108,16 @@ class DocumentValidator {
                 std::set<int> inUpdate;
                 for (const ObjectDescriptor& od : update->descriptors) {
                     if (od.id < 1 || od.id > 1022)
-                        add(2021, odName(od.id), fmt::format("the id {}", od.id), "1 to 1022");
+                        add(2021, descriptorText(od.id), fmt::format("the id {}", od.id),
+                            "1 to 1022");
                     if (!inUpdate.insert(od.id).second)
-                        add(2022, odName(od.id), "the id twice in one update", "each id once");
+                        add(2022, descriptorText(od.id), "the id twice in one update",
+                            "each id once");
                     present.insert(od.id);
+                    if (od.url.empty() && od.streams.empty())
+                        add(2023, descriptorText(od.id), "no stream", "a stream with a picture");
                     for (const ElementaryStream& stream : od.streams) {
-                        checkEsId(stream, odName(od.id));
+                        checkEsId(stream, descriptorText(od.id));
                         checkImageStream(od, stream);
                     }
                 }
@@ -122,10 +125,11 @@ class DocumentValidator {
         }
         for (const int id : named)
             if (!present.contains(id))
-                add(2020, odName(id), "no such object descriptor", "one, since the scene names it");
+                add(2020, descriptorText(id), "no such object descriptor",
+                    "one, since the scene names it");
         for (const int id : present)
             if (!named.contains(id))
-                add(2024, odName(id), "no node that names it", "a url of a texture");
+                add(2024, descriptorText(id), "no node that names it", "a url of a texture");
     }
     /// Object descriptors that some node of the scene, or a command, names; or a node of one type.
     std::set<int> namedDescriptors(std::string_view type = {}) const {
@@ -164,13 +168,14 @@ class DocumentValidator {
         if (stream.streamType != StreamType::visual && stream.streamType != StreamType::none)
             return;
         if (stream.url.empty() && (stream.samples.empty() || stream.samples[0].data.size == 0)) {
-            add(2023, odName(od.id), "a stream without a picture", "a JPEG or PNG file in it");
+            add(2023, descriptorText(od.id), "a stream without a picture",
+                "a JPEG or PNG file in it");
             return;
         }
         if (stream.samples.empty()) return;
         if (stream.objectTypeIndication != oti::kJpeg && stream.objectTypeIndication != oti::kPng) {
             if (!(isVideoCoding(stream.objectTypeIndication) && ofMovies_.contains(od.id)))
-                add(2026, odName(od.id),
+                add(2026, descriptorText(od.id),
                     fmt::format("objectTypeIndication 0x{:02X}", stream.objectTypeIndication),
                     "0x6C (JPEG) or 0x6D (PNG)");
             return;
@@ -183,7 +188,7 @@ class DocumentValidator {
         const bool png = (*bytes)[0] == std::byte{0x89} && (*bytes)[1] == std::byte{'P'};
         const bool saysJpeg = stream.objectTypeIndication == oti::kJpeg;
         if ((saysJpeg && !jpeg) || (!saysJpeg && !png))
-            add(2025, odName(od.id),
+            add(2025, descriptorText(od.id),
                 jpeg  ? "a JPEG"
                 : png ? "a PNG"
                       : "neither JPEG nor PNG",

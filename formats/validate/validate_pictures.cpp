@@ -84,20 +84,31 @@ void checkMask(const std::string& mask, const std::string& where, const PictureR
         pictures.findings.add(4005, where, image.error().text(), "an image that can be decoded");
 }
 
+/// Whether a rule on the descriptors that a texture names was found broken: one that is not there
+/// (2020), or without a picture (2023).
+bool descriptorReported(const Node& texture, const Findings& findings) {
+    const int field = texture.info->find("url");
+    const auto* urls = field < 0 ? nullptr : std::get_if<std::vector<Url>>(&texture.value(field));
+    if (!urls) return false;
+    return std::ranges::any_of(findings.list, [&](const Finding& finding) {
+        return (finding.rule->number == 2020 || finding.rule->number == 2023) &&
+               std::ranges::any_of(*urls, [&](const Url& url) {
+                   return finding.where == descriptorText(url.objectDescriptorId);
+               });
+    });
+}
+
 }  // namespace
+
+std::string descriptorText(int id) {
+    return fmt::format("object descriptor {}", id);
+}
 
 std::optional<ImageInfo> PictureReader::probe(const Node& image, std::string_view what,
                                               const std::string& where) const {
     auto info = images.probe(image);
     if (info) return *info;
-    // PROBE_REPORTED
-    const ElementaryStream* stream = images.stream(image);
-    const bool reported = stream && (stream->samples.empty() || stream->samples[0].data.size == 0);
-    bool missing = false;
-    if (const int url = image.info->find("url"); url >= 0 && !stream)
-        if (const auto* urls = std::get_if<std::vector<Url>>(&image.value(url)))
-            missing = !urls->empty() && urls->front().objectDescriptorId != 0;
-    if (!reported && !missing)
+    if (!descriptorReported(image, findings))
         findings.add(4005, where, fmt::format("{}: {}", what, info.error().message), "an image");
     return {};
 }

@@ -13,6 +13,9 @@
 /// The pictures of a presentation: their headers and, where they are decoded, their pixels.
 namespace stx {
 
+/// "object descriptor 7": where a finding of rules 2020 to 2026 is.
+[[nodiscard]] std::string descriptorText(int id);
+
 /// Reads pictures as a renderer would, and adds a finding of rule 4005 for each that cannot be
 /// read. `what`: the field that has the picture.
 struct PictureReader {

@@ -350,6 +350,39 @@ TEST(Validate, PicturesOfABackgroundAreDecoded) {
     EXPECT_EQ(numbersWith(document, false), Numbers{});
 }
 
+TEST(Validate, ADescriptorOfAnImageHasAStream) {
+    for (const char* field : {"texture", "depth", "splatV"}) {
+        Document document = sound();
+        const int id = textureOf(document)
+                           ->get<NodePtr>(field)
+                           ->get<std::vector<Url>>("url")
+                           .at(0)
+                           .objectDescriptorId;
+        for (ObjectDescriptor& od : odsOf(document))
+            if (od.id == id) od.streams.clear();
+        EXPECT_EQ(numbersWith(document, true), Numbers{2023}) << field;
+        EXPECT_EQ(numbersWith(document, false), Numbers{2023}) << field;
+    }
+    // A stream that is no picture, of which descriptors' rules say nothing.
+    Document document = sound();
+    streamOf(document, "texture").streamType = StreamType::audio;
+    streamOf(document, "texture").samples.clear();
+    EXPECT_EQ(numbersWith(document, true), Numbers{4005});
+    // A stream that is elsewhere.
+    document = sound();
+    streamOf(document, "texture").url = "http://localhost/a.png";
+    streamOf(document, "texture").samples.clear();
+    EXPECT_EQ(numbersWith(document, true), Numbers{4005});
+    // Of a Background.
+    document = fromText(camera("") +
+                        " Background { frontUrl [od:10] backUrl [od:10] leftUrl "
+                        "[od:10] rightUrl [od:10] topUrl [od:10] bottomUrl [od:10] }");
+    ObjectDescriptor od;
+    od.id = 10;
+    document.odFrames = {{0, {UpdateObjectDescriptors{{od}}}}};
+    EXPECT_EQ(numbersWith(document, true), Numbers{2023});
+}
+
 TEST(Validate, MasksInWorldInfoAreDecoded) {
     const std::vector<std::uint8_t> grey(48, 0);
     const Bytes png = *encodePng(8, 6, 1, 8, grey.data(), false);
