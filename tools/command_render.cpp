@@ -207,16 +207,6 @@ std::optional<std::pair<int, int>> ownRate(const RenderOptions& o, const DrawnSc
     return {};
 }
 
-Result<void> checkCameras(const std::vector<NovelCamera>& pictures, const Limits& limits) {
-    for (std::size_t i = 0; i < pictures.size(); ++i) {
-        const Camera& camera = pictures[i].camera;
-        STX_CHECK(within(fmt::format("camera {}", i), camera.check()));
-        STX_CHECK(limits.checkAllocation(static_cast<std::uint64_t>(camera.width) * camera.height,
-                                         64, "the picture"));
-    }
-    return {};
-}
-
 /// What was drawn.
 struct Drawn {
     nlohmann::ordered_json views = nlohmann::ordered_json::array();  ///< as the report has them
@@ -335,7 +325,7 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
         STX_CHECK(lightBy(scene.model, settings, program.job));
     STX_TRY(const auto pictures, picturesOf(o, scene, program));
     STX_CHECK(checkNames(o, static_cast<int>(pictures.size()), program));
-    STX_CHECK(checkCameras(pictures, program.job.limits));
+    STX_CHECK(checkPictures(o, settings, pictures, scene, program.job.limits));
     writing.rate = ownRate(o, scene, pictures, program.job).value_or(writing.rate);
     if (!scene.moving) {
         STX_CHECK(makeStill(o, settings, pictures, scene, program.job));

@@ -13,6 +13,7 @@
 #include "lib/model/peak_memory.hpp"
 #include "lib/sheet/sheet.hpp"
 #include "tools/commands.hpp"
+#include "tools/peak_of_views.hpp"
 #include "tools/refining.hpp"
 
 namespace stx::tools {
@@ -63,9 +64,11 @@ Result<std::vector<SheetPair>> pairsOfPictures(const SheetOptions& o, Job& job) 
 /// The views of two inputs, by their numbers; of what moves at some moments.
 Result<std::vector<SheetPair>> pairsOfViews(const SheetOptions& o, Job& job) {
     STX_TRY(const auto a, openSequence(o.inputs[0], o.open, job));
-    // Before the other one is read.
-    auto first = a->frame(0, job);
+    STX_TRY(auto table, a->views(0, job));
+    STX_CHECK(checkImagesFit(peak::kSheetOfTwo, *table, job.limits));
+    auto first = wholeBundle(std::move(table), job);
     if (!first) return propagate(first);
+    // Before the other one is read.
     STX_CHECK(checkPeak(peak::kSheetOfTwo, first->views, job.limits));
     STX_TRY(const auto b, openSequence(o.inputs[1], o.open, job));
     const auto count = std::min(a->timeline().count(), b->timeline().count());

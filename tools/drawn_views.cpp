@@ -1,5 +1,7 @@
 #include "tools/drawn_views.hpp"
 
+#include <algorithm>
+
 #include "lib/model/peak_memory.hpp"
 
 namespace stx::tools {
@@ -10,27 +12,43 @@ namespace {
 constexpr std::uint64_t kKnown = 2;
 constexpr PeakMemory kPreparing = {"drawing", 32};
 
+struct DrawingTakes {
+    std::uint64_t images = 0, pixels = 0;  ///< of the views
+    std::uint64_t inMemory = 0, fromSpool = 0;
+
+    DrawingTakes(const ViewTable& table, const PeakMemory& drawing,
+                 const std::vector<bool>& wanted) {
+        for (std::size_t i = 0; i < table.count(); ++i) {
+            if (!wanted[i]) continue;
+            images += table.bytesOf(i);
+            inMemory += table.bytesOf(i) + drawing.perPixel * table.pixelsOf(i);
+            pixels += table.pixelsOf(i);
+        }
+        const std::uint64_t beside = memoryOfEach(table, kPreparing) + kKnown * pixels;
+        fromSpool = beside + beside / (kSpoolPart - 1);
+    }
+};
+
 }  // namespace
+
+Result<void> checkDrawing(const ViewTable& table, const PeakMemory& drawing,
+                          const std::vector<bool>& wanted, const Limits& limits) {
+    const DrawingTakes takes(table, drawing, wanted);
+    return checkPeak({kPreparing.what, 0}, takes.pixels, 0,
+                     std::min(takes.inMemory, takes.fromSpool), limits);
+}
 
 Result<Bundle> viewsToDraw(
     const ViewTable& table, const PeakMemory& drawing, const std::vector<bool>& wanted,
     const std::filesystem::path& folder, std::unique_ptr<FileSpool>& spool, Job& job,
     const std::function<Result<void>(std::size_t, const ReferenceView&)>& look) {
     const std::uint64_t limit = job.limits.maxMemoryBytes;
-    std::uint64_t images = 0, inMemory = 0, pixels = 0;
-    for (std::size_t i = 0; i < table.count(); ++i) {
-        if (!wanted[i]) continue;
-        images += table.bytesOf(i);
-        inMemory += table.bytesOf(i) + drawing.perPixel * table.pixelsOf(i);
-        pixels += table.pixelsOf(i);
-    }
-    const std::uint64_t beside = memoryOfEach(table, kPreparing) + kKnown * pixels;
-    const std::uint64_t fromSpool = beside + beside / (kSpoolPart - 1);
-    if (inMemory > limit && inMemory > fromSpool) {
-        STX_CHECK(checkPeak({kPreparing.what, 0}, pixels, 0, fromSpool, job.limits));
+    const DrawingTakes takes(table, drawing, wanted);
+    if (takes.inMemory > limit && takes.inMemory > takes.fromSpool) {
+        STX_CHECK(checkDrawing(table, drawing, wanted, job.limits));
         STX_TRY(spool, FileSpool::create(folder, limit / kSpoolPart));
     } else
-        STX_CHECK(within(table.where(), job.limits.checkAllocation(images, 1, "the views")));
+        STX_CHECK(within(table.where(), job.limits.checkAllocation(takes.images, 1, "the views")));
     return someViews(table, wanted, spool.get(), job, look);
 }
 

@@ -19,4 +19,8 @@ namespace stx::tools {
     const std::filesystem::path& folder, std::unique_ptr<FileSpool>& spool, Job& job,
     const std::function<Result<void>(std::size_t index, const ReferenceView& view)>& look = {});
 
+/// Error (invalidInput) where drawing those views takes more than the limit, even from a spool.
+[[nodiscard]] Result<void> checkDrawing(const ViewTable& table, const PeakMemory& drawing,
+                                        const std::vector<bool>& wanted, const Limits& limits);
+
 }  // namespace stx::tools

@@ -13,6 +13,7 @@
 #include "lib/refine/refine_needed.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
 #include "tools/camera_options.hpp"
+#include "tools/peak_of_views.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/refining.hpp"
 
@@ -69,6 +70,8 @@ Result<Bundle> viewsOfModel(std::unique_ptr<ViewTable> table, const RefineSettin
         if (needed) STX_CHECK(refineViews(bundle, settings, *spool, job));
         return bundle;
     }
+    STX_CHECK(checkImagesFit(takes, *table, job.limits,
+                             fewer ? UINT64_MAX : memoryOfSpooledSurfaces(*table)));
     STX_TRY(auto bundle, wholeBundle(std::move(table), job));
     STX_CHECK(refineViews(bundle, settings, takes, job));
     return bundle;

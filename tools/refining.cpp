@@ -10,6 +10,7 @@
 #include "formats/files/file_spool.hpp"
 #include "formats/files/files.hpp"
 #include "lib/refine/refine_needed.hpp"
+#include "tools/peak_of_views.hpp"
 
 namespace stx::tools {
 namespace {
@@ -30,17 +31,6 @@ Result<void> checkNoImport(const RefineSettings& settings) {
 PeakMemory mostOf(const PeakMemory& then) {
     const bool thenMore = then.perPixel + then.perPixelOfLargest > peak::kRefine.perPixel;
     return thenMore ? then : peak::kRefine;
-}
-
-/// checkPeak() of all views of a table in memory.
-Result<void> checkPeakOfAll(const PeakMemory& step, const ViewTable& views, const Limits& limits) {
-    std::uint64_t pixels = 0, largest = 0, held = 0;
-    for (std::size_t i = 0; i < views.count(); ++i) {
-        pixels += views.pixelsOf(i);
-        largest = std::max(largest, views.pixelsOf(i));
-        held += views.bytesGiven(i);
-    }
-    return checkPeak(step, pixels, largest, held, limits);
 }
 
 /// Whether refining takes less memory with the views in a spool. Small captures do not.

@@ -118,7 +118,44 @@ std::int64_t pointsOf(const std::vector<ViewSummary>& summaries) {
     return points;
 }
 
+/// The views of a table that pictures are drawn from. `settings`: those of makeStill().
+std::vector<bool> wantedViews(const RenderOptions& o, const RenderSettings& settings,
+                              const std::vector<NovelCamera>& pictures, const DrawnScene& scene) {
+    std::vector<Camera> cameras;
+    const auto part = o.shard.rangeOf(pictures.size());
+    for (std::size_t i = part.first; i < part.end; ++i) cameras.push_back(pictures[i].camera);
+    const auto& headers = std::get<Bundle>(scene.model).views;
+    return neededViews(o.backend, o.device, headers, scene.summaries, settings, cameras);
+}
+
+/// What makeStill() draws with.
+RenderSettings settingsOf(const RenderSettings& asked, const DrawnScene& scene) {
+    RenderSettings settings = asked;
+    if (scene.exact) settings.refine = RefineSettings::none();
+    return settings;
+}
+
 }  // namespace
+
+Result<void> checkPictures(const RenderOptions& o, const RenderSettings& asked,
+                           const std::vector<NovelCamera>& pictures, const DrawnScene& scene,
+                           const Limits& limits) {
+    constexpr std::uint64_t kBytesPerPixel = 64;
+    std::uint64_t largest = 0;
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
+        const Camera& camera = pictures[i].camera;
+        STX_CHECK(within(fmt::format("camera {}", i), camera.check()));
+        largest = std::max(largest, static_cast<std::uint64_t>(camera.width) * camera.height);
+    }
+    auto fits = limits.checkAllocation(largest, kBytesPerPixel, "the picture");
+    if (fits || !scene.table) return fits;
+    const RenderSettings settings = settingsOf(asked, scene);
+    const auto wanted = wantedViews(o, settings, pictures, scene);
+    Limits ofPicture = limits;
+    ofPicture.maxMemoryBytes = largest * kBytesPerPixel;
+    if (checkDrawing(*scene.table, drawingMemory(settings), wanted, ofPicture)) return fits;
+    return checkDrawing(*scene.table, drawingMemory(settings), wanted, limits);
+}
 
 Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& settings,
                              const Command& command, Program& program) {
@@ -174,15 +211,9 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
 
 Result<void> makeStill(const RenderOptions& o, const RenderSettings& asked,
                        const std::vector<NovelCamera>& pictures, DrawnScene& scene, Job& job) {
-    RenderSettings settings = asked;
-    if (scene.exact) settings.refine = RefineSettings::none();
+    const RenderSettings settings = settingsOf(asked, scene);
     if (scene.table) {
-        std::vector<Camera> cameras;
-        const auto part = o.shard.rangeOf(pictures.size());
-        for (std::size_t i = part.first; i < part.end; ++i) cameras.push_back(pictures[i].camera);
-        const auto& headers = std::get<Bundle>(scene.model).views;
-        const auto wanted =
-            neededViews(o.backend, o.device, headers, scene.summaries, settings, cameras);
+        const auto wanted = wantedViews(o, settings, pictures, scene);
         const auto check = [&](std::size_t index, const ReferenceView& view) -> Result<void> {
             if (mayBeSummaryOf(scene.summaries[index], view)) return {};
             return failAt(fmt::format("{}: view {}", scene.table->where(), index),

@@ -65,6 +65,12 @@ struct DrawnScene {
 [[nodiscard]] Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& settings,
                                            const Command& command, Program& program);
 
+/// Errors: Camera::check(); (invalidInput) a picture takes more than the limit. Where drawing it
+/// takes even more, as far as that is known, the error says so.
+[[nodiscard]] Result<void> checkPictures(const RenderOptions& o, const RenderSettings& settings,
+                                         const std::vector<NovelCamera>& pictures,
+                                         const DrawnScene& scene, const Limits& limits);
+
 /// Reads the views that pictures are drawn from, and makes the renderer of a scene that stands
 /// still. Errors: those of the views; (invalidInput) a summary that is not that of its pixels.
 [[nodiscard]] Result<void> makeStill(const RenderOptions& o, const RenderSettings& settings,

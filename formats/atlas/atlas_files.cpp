@@ -384,10 +384,7 @@ Result<Atlas> readFolder(const fs::path& path, Job& job) {
     for (std::size_t i = 0; i < coverage.size(); ++i) {
         if (!coverage[i].empty()) setAlpha(*atlas.pages[i].texture.rgba8(), coverage[i]);
     }
-    if (!header.environmentFile.empty()) {
-        STX_TRY(const auto file, resolveInside(folder, header.environmentFile, job.limits));
-        STX_TRY(atlas.environment, readEnvironmentExr(file, job));
-    }
+    STX_SET(atlas.environment, readAtlasEnvironment(path, header, job));
     return checked(std::move(atlas), header, where);
 }
 
@@ -514,6 +511,21 @@ Result<void> readAtlasTexture(const fs::path& path, const AtlasHeader& header,
     STX_TRY(const auto file, resolveInside(setFolderOf(path), texture.file, limits));
     Image<std::uint8_t> coverage;
     return readImage(file, header, texture, page, coverage, limits);
+}
+
+Result<std::shared_ptr<const Environment>> readAtlasEnvironment(const fs::path& path,
+                                                                const AtlasHeader& header,
+                                                                Job& job) {
+    if (!header.environmentFile.empty()) {
+        STX_TRY(const auto file,
+                resolveInside(setFolderOf(path), header.environmentFile, job.limits));
+        return readEnvironmentExr(file, job);
+    }
+    std::shared_ptr<const Environment> none;
+    if (isFolderPath(path)) return none;
+    STX_TRY(const auto reader, ExrReader::open(path, job.limits));
+    const int at = environmentPartOf(reader);
+    return at < 0 ? none : readEnvironmentPart(reader, at, job);
 }
 
 bool isAtlasFolder(const fs::path& path) {

@@ -107,6 +107,10 @@ struct AtlasSaveOptions {
                                             const AtlasHeader& header, const AtlasTexture& texture,
                                             AtlasPage& page, const Limits& limits);
 
+/// The environment of an atlas; null: it has none. Errors: files, readEnvironmentPart().
+[[nodiscard]] Result<std::shared_ptr<const Environment>> readAtlasEnvironment(
+    const std::filesystem::path& path, const AtlasHeader& header, Job& job);
+
 /// The path is a folder that holds an atlas.json, or that file itself.
 [[nodiscard]] bool isAtlasFolder(const std::filesystem::path& path);
 /// An OpenEXR file that holds an atlas and no bundle.

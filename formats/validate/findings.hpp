@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,9 @@ void checkViewHeader(const ReferenceView& view, const std::string& where, Findin
                                            Findings& findings);
 /// Rules on normals that need pixels; normals and camera of the view are in one frame.
 void checkVectors(const ReferenceView& view, const std::string& where, Findings& findings);
+
+/// Rule 4005 on the environment of a bundle or atlas, as reading it went.
+void checkEnvironment(const Result<std::shared_ptr<const Environment>>& read, Findings& findings);
 
 /// The two other kinds of files, for validateFile().
 [[nodiscard]] Result<std::vector<Finding>> validateExrFile(const std::filesystem::path& path,

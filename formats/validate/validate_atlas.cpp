@@ -176,6 +176,7 @@ Result<std::vector<Finding>> validateAtlasFile(const std::filesystem::path& path
     checkRectangles(header->atlas.views, header->pages, {header->pageWidth, header->pageHeight},
                     header->atlas.rectangles, findings);
     checkTextures(path, *header, options, job, findings);
+    if (options.pixels) checkEnvironment(readAtlasEnvironment(path, *header, job), findings);
     return findings.list;
 }
 

@@ -10,8 +10,7 @@ using namespace mpeg4;
 
 namespace {
 
-void checkPictures(const Node& node, const StreamImages& images, const std::string& where,
-                   Findings& findings) {
+void checkPictures(const Node& node, const PictureReader& pictures, const std::string& where) {
     std::vector<glm::ivec2> sizes;
     std::string listed, missing;
     int there = 0;
@@ -23,23 +22,18 @@ void checkPictures(const Node& node, const StreamImages& images, const std::stri
             continue;
         }
         ++there;
-        const auto info = images.probe(*texture);
-        if (!info) {
-            // What is not there at all breaks a rule on descriptors.
-            const ElementaryStream* stream = images.stream(*texture);
-            if (stream && !stream->samples.empty() && stream->samples[0].data.size > 0)
-                findings.add(4005, where, fmt::format("{}Url: {}", face, info.error().message),
-                             "an image");
-            continue;
-        }
+        const std::string what = fmt::format("{}Url", face);
+        const auto info = pictures.probe(*texture, what, where);
+        if (!info) continue;
+        (void)pictures.decode(*texture, what, where);
         sizes.emplace_back(info->width, info->height);
         listed += (listed.empty() ? "" : ", ") +
                   fmt::format("{} {}", face, sizeText(info->width, info->height));
     }
     const auto fits = [&](glm::ivec2 size) { return size.x == size.y && size == sizes[0]; };
     if (!std::ranges::all_of(sizes, fits))
-        findings.add(8001, where, listed, "six squares of one size");
-    if (there > 0 && there < 6) findings.add(8002, where, missing, "all six pictures");
+        pictures.findings.add(8001, where, listed, "six squares of one size");
+    if (there > 0 && there < 6) pictures.findings.add(8002, where, missing, "all six pictures");
 }
 
 void checkGradient(const Node& node, const char* what, const std::string& where,
@@ -62,15 +56,15 @@ void checkGradient(const Node& node, const char* what, const std::string& where,
 
 }  // namespace
 
-void checkBackgrounds(const std::vector<ShownBackground>& backgrounds, const StreamImages& images,
-                      Findings& findings) {
+void checkBackgrounds(const std::vector<ShownBackground>& backgrounds,
+                      const PictureReader& pictures) {
     for (const ShownBackground& background : backgrounds) {
         const Node& node = *background.node;
         const std::string where =
             node.defName.empty() ? "Background" : fmt::format("Background '{}'", node.defName);
-        checkPictures(node, images, where, findings);
-        checkGradient(node, "sky", where, findings);
-        checkGradient(node, "ground", where, findings);
+        checkPictures(node, pictures, where);
+        checkGradient(node, "sky", where, pictures.findings);
+        checkGradient(node, "ground", where, pictures.findings);
     }
 }
 

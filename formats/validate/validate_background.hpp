@@ -1,14 +1,12 @@
 #pragma once
 
-#include "formats/mpeg4/mapping/stream_images.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
-#include "formats/validate/findings.hpp"
+#include "formats/validate/validate_pictures.hpp"
 
 namespace stx {
 
-/// Rules 8xxx on the Backgrounds of a scene, and 4005 on their pictures. Headers are read, no
-/// pixels.
+/// Rules 8xxx on the Backgrounds of a scene, and 4005 on their pictures.
 void checkBackgrounds(const std::vector<mpeg4::ShownBackground>& backgrounds,
-                      const mpeg4::StreamImages& images, Findings& findings);
+                      const PictureReader& pictures);
 
 }  // namespace stx

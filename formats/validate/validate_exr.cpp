@@ -2,6 +2,7 @@
 
 #include "formats/any/open.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/exr/environment_exr.hpp"
 #include "formats/validate/findings.hpp"
 
 namespace stx {
@@ -47,6 +48,11 @@ bool checkChannels(ExrPart& part, const std::string& where, Findings& findings) 
 
 }  // namespace
 
+void checkEnvironment(const Result<std::shared_ptr<const Environment>>& read, Findings& findings) {
+    if (!read)
+        findings.add(4005, "environment", read.error().text(), "a picture that can be decoded");
+}
+
 Result<std::vector<Finding>> validateExrFile(const std::filesystem::path& path,
                                              const ValidateOptions& options, Job& job) {
     const auto reader = ExrReader::open(path, job.limits);
@@ -85,6 +91,8 @@ Result<std::vector<Finding>> validateExrFile(const std::filesystem::path& path,
         }
         points += checkViewImages(*view, where, findings);
     }
+    if (const int at = environmentPartOf(*reader); at >= 0 && options.pixels)
+        checkEnvironment(readEnvironmentPart(*reader, at, job), findings);
     if (allRead && points == 0) findings.add(4007, "", "no point in any view", "points");
     return findings.list;
 }

@@ -8,13 +8,13 @@
 #include "formats/mpeg4/mapping/octree.hpp"
 #include "formats/mpeg4/mapping/point_texture.hpp"
 #include "formats/mpeg4/mapping/stream_images.hpp"
-#include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
 #include "formats/validate/findings.hpp"
 #include "formats/validate/validate_background.hpp"
 #include "formats/validate/validate_moments.hpp"
 #include "formats/validate/validate_movies.hpp"
+#include "formats/validate/validate_pictures.hpp"
 
 namespace stx {
 
@@ -82,7 +82,6 @@ class DocumentValidator {
     }
 
     // ---- Descriptors
-    static std::string odName(int id) { return fmt::format("object descriptor {}", id); }
     void checkDescriptors() {
         std::set<std::uint32_t> esIds;
         const auto checkEsId = [&](const ElementaryStream& stream, const std::string& where) {
@@ -109,12 +108,16 @@ class DocumentValidator {
                 std::set<int> inUpdate;
                 for (const ObjectDescriptor& od : update->descriptors) {
                     if (od.id < 1 || od.id > 1022)
-                        add(2021, odName(od.id), fmt::format("the id {}", od.id), "1 to 1022");
+                        add(2021, descriptorText(od.id), fmt::format("the id {}", od.id),
+                            "1 to 1022");
                     if (!inUpdate.insert(od.id).second)
-                        add(2022, odName(od.id), "the id twice in one update", "each id once");
+                        add(2022, descriptorText(od.id), "the id twice in one update",
+                            "each id once");
                     present.insert(od.id);
+                    if (od.url.empty() && od.streams.empty())
+                        add(2023, descriptorText(od.id), "no stream", "a stream with a picture");
                     for (const ElementaryStream& stream : od.streams) {
-                        checkEsId(stream, odName(od.id));
+                        checkEsId(stream, descriptorText(od.id));
                         checkImageStream(od, stream);
                     }
                 }
@@ -122,10 +125,11 @@ class DocumentValidator {
         }
         for (const int id : named)
             if (!present.contains(id))
-                add(2020, odName(id), "no such object descriptor", "one, since the scene names it");
+                add(2020, descriptorText(id), "no such object descriptor",
+                    "one, since the scene names it");
         for (const int id : present)
             if (!named.contains(id))
-                add(2024, odName(id), "no node that names it", "a url of a texture");
+                add(2024, descriptorText(id), "no node that names it", "a url of a texture");
     }
     /// Object descriptors that some node of the scene, or a command, names; or a node of one type.
     std::set<int> namedDescriptors(std::string_view type = {}) const {
@@ -164,13 +168,14 @@ class DocumentValidator {
         if (stream.streamType != StreamType::visual && stream.streamType != StreamType::none)
             return;
         if (stream.url.empty() && (stream.samples.empty() || stream.samples[0].data.size == 0)) {
-            add(2023, odName(od.id), "a stream without a picture", "a JPEG or PNG file in it");
+            add(2023, descriptorText(od.id), "a stream without a picture",
+                "a JPEG or PNG file in it");
             return;
         }
         if (stream.samples.empty()) return;
         if (stream.objectTypeIndication != oti::kJpeg && stream.objectTypeIndication != oti::kPng) {
             if (!(isVideoCoding(stream.objectTypeIndication) && ofMovies_.contains(od.id)))
-                add(2026, odName(od.id),
+                add(2026, descriptorText(od.id),
                     fmt::format("objectTypeIndication 0x{:02X}", stream.objectTypeIndication),
                     "0x6C (JPEG) or 0x6D (PNG)");
             return;
@@ -183,7 +188,7 @@ class DocumentValidator {
         const bool png = (*bytes)[0] == std::byte{0x89} && (*bytes)[1] == std::byte{'P'};
         const bool saysJpeg = stream.objectTypeIndication == oti::kJpeg;
         if ((saysJpeg && !jpeg) || (!saysJpeg && !png))
-            add(2025, odName(od.id),
+            add(2025, descriptorText(od.id),
                 jpeg  ? "a JPEG"
                 : png ? "a PNG"
                       : "neither JPEG nor PNG",
@@ -227,13 +232,17 @@ class DocumentValidator {
                 ++index;
             }
         }
-        checkBackgrounds(shown->backgrounds, *images_, findings_);
+        checkBackgrounds(shown->backgrounds, pictures());
+        checkMasks(shown->infos, pictures());
         // A place without an object is a scene, too.
         if (index == 0 && shown->backgrounds.empty())
             add(4014, "scene", "no DepthImage that is shown", "one at least");
         checkObject(*shown);
         if (options_.pixels && decoded_ > 0 && decoded_ == emptyViews_)
             add(4007, "scene", "no point in any view", "points (depth codes above 0)");
+    }
+    PictureReader pictures() {
+        return {*images_, source_.decode, options_, job_.limits, findings_};
     }
     static std::string nameOf(const Node& node, int index) {
         const std::string kind = node.is("OctreeImage") ? "OctreeImage" : "view";
@@ -351,23 +360,6 @@ class DocumentValidator {
         add(4006, where, "no point (all depth codes are 0)", "one point at least");
     }
 
-    std::optional<ImageInfo> infoOf(const NodePtr& node, const std::string& where,
-                                    std::string_view what) {
-        auto info = images_->probe(*node);
-        if (info) return *info;
-        // An image that is not there breaks a rule on descriptors, which is reported there.
-        const ElementaryStream* stream = images_->stream(*node);
-        const bool reported =
-            stream && (stream->samples.empty() || stream->samples[0].data.size == 0);
-        bool missing = false;
-        if (const int url = node->info->find("url"); url >= 0 && !stream)
-            if (const auto* urls = std::get_if<std::vector<Url>>(&node->value(url)))
-                missing = !urls->empty() && urls->front().objectDescriptorId != 0;
-        if (!reported && !missing)
-            add(4005, where, fmt::format("{}: {}", what, info.error().message), "an image");
-        return {};
-    }
-
     void checkSimpleTexture(const Node& node, const Node& texture, const std::string& where,
                             bool inOctree) {
         const NodePtr& colour = texture.get<NodePtr>("texture");
@@ -376,8 +368,8 @@ class DocumentValidator {
             add(4009, where, "a texture without images", "texture and depth");
             return;
         }
-        const auto colourInfo = colour ? infoOf(colour, where, "texture") : std::nullopt;
-        const auto depthInfo = depth ? infoOf(depth, where, "depth") : std::nullopt;
+        const auto colourInfo = colour ? pictures().probe(*colour, "texture", where) : std::nullopt;
+        const auto depthInfo = depth ? pictures().probe(*depth, "depth", where) : std::nullopt;
         const bool hasAlpha =
             colourInfo && (colourInfo->channels == 2 || colourInfo->channels == 4);
         if (!depth && !inOctree && colourInfo && !hasAlpha)
@@ -402,7 +394,10 @@ class DocumentValidator {
         }
         const auto& size = depthInfo ? depthInfo : colourInfo;
         checkVectorImages(node, texture, where, size);
-        if (options_.pixels && !inOctree) checkPixels(node, texture, where);
+        const auto highest = checkViewPixels(node, texture, where, inOctree, pictures());
+        if (!highest) return;
+        ++decoded_;
+        if (*highest == 0) countEmpty(where);
     }
 
     void checkVectorImages(const Node& node, const Node& texture, const std::string& where,
@@ -410,7 +405,7 @@ class DocumentValidator {
         if (!texture.is("SimpleTextureV2")) return;
         for (const char* field : {"normal", "splatU", "splatV"}) {
             const NodePtr& image = texture.get<NodePtr>(field);
-            const auto info = image ? infoOf(image, where, field) : std::nullopt;
+            const auto info = image ? pictures().probe(*image, field, where) : std::nullopt;
             if (!info) continue;
             if (size && (info->width != size->width || info->height != size->height))
                 add(6001, where,
@@ -437,95 +432,6 @@ class DocumentValidator {
         const glm::vec2 range = std::get<glm::vec2>(node.value(minMax));
         if (!(range.x < range.y) || !std::isfinite(range.x) || !std::isfinite(range.y))
             add(6005, where, fmt::format("splatMinMax {} {}", range.x, range.y), "a range");
-    }
-
-    void checkPixels(const Node& node, const Node& texture, const std::string& where) {
-        const auto decode = [&](const NodePtr& image,
-                                std::string_view what) -> std::optional<DecodedImage> {
-            if (!images_->probe(*image)) return {};  // reported already
-            auto decoded = images_->decode(
-                *image, source_.decode, job_.limits,
-                what == "depth" ? StreamImages::Samples::codes : StreamImages::Samples::colours);
-            if (decoded) return std::move(*decoded);
-            // Video that is not decoded here breaks no rule.
-            if (decoded.error().code == ErrorCode::unsupported) return {};
-            add(4005, where, fmt::format("{}: {}", what, decoded.error().text()),
-                "an image that can be decoded");
-            return {};
-        };
-        const NodePtr& colourNode = texture.get<NodePtr>("texture");
-        const NodePtr& depthNode = texture.get<NodePtr>("depth");
-        std::optional<DecodedImage> depth, colour;
-        if (colourNode) colour = decode(colourNode, "texture");
-        if (depthNode) depth = decode(depthNode, "depth");
-        const DecodedImage* codes = depth ? &*depth : !depthNode && colour ? &*colour : nullptr;
-        if (!codes) return;
-        const bool alpha = codes->channels == 2 || codes->channels == 4;
-        if (!depth && !alpha) return;
-        const int channel = depth ? 0 : codes->channels - 1;
-        std::uint32_t highest = 0;
-        std::visit(
-            [&](const auto& values) {
-                for (std::size_t i = static_cast<std::size_t>(channel); i < values.size();
-                     i += static_cast<std::size_t>(codes->channels))
-                    highest = std::max(highest, static_cast<std::uint32_t>(values[i]));
-            },
-            codes->values);
-        ++decoded_;
-        if (highest == 0) countEmpty(where);
-        if (codes->bits() == 16 && highest > 0 && highest <= 255)
-            add(4010, where, fmt::format("16-bit depth codes that end at {}", highest),
-                "codes up to 65535: all of it lies at the far plane");
-        if (!texture.is("SimpleTextureV2")) return;
-        const NodePtr& normalNode = texture.get<NodePtr>("normal");
-        const float nearPlane = node.get<float>("nearPlane"),
-                    farPlane = node.get<float>("farPlane");
-        const glm::vec2 fov = node.get<glm::vec2>("fieldOfView");
-        if (!normalNode || !(nearPlane < farPlane) || !(fov.x > 0 && fov.y > 0)) return;
-        const auto normals = decode(normalNode, "normal");
-        if (!normals || normals->width != codes->width || normals->height != codes->height ||
-            normals->channels < 3)
-            return;
-        ReferenceView view;
-        const auto info = images_->probe(depthNode ? *depthNode : *colourNode);
-        const int greyBits = info ? info->greyBits : 0;
-        const auto distances = depthFromImage(*codes, channel, greyBits, nearPlane, farPlane);
-        if (!distances) return;
-        view.depth = *distances;
-        const auto vectors = normalsFromImage(*normals, view.depth);
-        if (!vectors) return;
-        view.normal = *vectors;
-        checkNormalLengths(*normals, view.depth, where);
-        view.camera = Camera::fromFieldOfView(
-            glm::dvec3(node.get<glm::vec3>("position")),
-            quatFromAxisAngle(axisAngle(node.get<Rotation>("orientation"))), glm::dvec2(fov),
-            node.get<bool>("orthographic"), codes->width, codes->height);
-        checkVectors(view, where, findings_);
-    }
-    void checkNormalLengths(const DecodedImage& image, const Image<float>& depth,
-                            const std::string& where) {
-        std::int64_t count = 0, off = 0;
-        std::visit(
-            [&](const auto& values) {
-                const double cmax = image.bits() == 8 ? 255.0 : 65535.0;
-                for (std::size_t i = 0; i < depth.count(); ++i) {
-                    if (!hasPoint(depth.pixels()[i])) continue;
-                    glm::dvec3 n;
-                    bool zero = true;
-                    for (int c = 0; c < 3; ++c) {
-                        const auto code = values[i * static_cast<std::size_t>(image.channels) + c];
-                        zero = zero && code == 0;
-                        n[c] = 2.0 * static_cast<double>(code) / cmax - 1.0;
-                    }
-                    if (zero) continue;  // no normal
-                    ++count;
-                    if (std::abs(glm::length(n) - 1.0) > 0.05) ++off;
-                }
-            },
-            image.values);
-        if (off * 100 > count)
-            add(6007, where, fmt::format("{} of {} normals with another length", off, count),
-                "length 1");
     }
 
     const Document& document_;

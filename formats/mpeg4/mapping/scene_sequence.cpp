@@ -152,7 +152,12 @@ Result<Timeline> timelineOf(const Document& document, const StreamImages& images
                             "a TimeSensor runs for {:g} s; that and what else moves are more than "
                             "{} moments",
                             span.end - span.begin, kMostMoments);
-            for (int i = 0; i < steps; ++i) times.push_back(span.begin + i / kSmoothRate);
+            int i = 0;
+            for (; i < steps; ++i) times.push_back(span.begin + i / kSmoothRate);
+            // The end is held, so it is a moment; at the step that reaches it, so that all last
+            // equally long.
+            if (span.stops && times.back() < span.end - halfTick(coarsest, span.end))
+                times.push_back(span.begin + i / kSmoothRate);
         }
         end = std::max(end, pictures ? end : span.end);
     }

@@ -11,8 +11,8 @@ namespace stx::mpeg4 {
 /// A presentation in time: MovieTextures (and other textures of streams with several pictures) at
 /// their composition times, commands at theirs, interpolators that TimeSensors drive. Its timeline
 /// has every moment at which a picture or a command changes something, within the first cycle of
-/// what repeats; where only interpolators move, 25 moments a second. Pictures are decoded when a
-/// frame is asked for. Errors as bundleFromScene().
+/// what repeats; where only interpolators move, 25 moments a second and, of a clock that stops, the
+/// one at its end. Pictures are decoded when a frame is asked for. Errors as bundleFromScene().
 [[nodiscard]] Result<std::unique_ptr<Sequence>> sequenceFromScene(Document document,
                                                                   const SceneReadOptions& options,
                                                                   Job& job);

@@ -140,7 +140,7 @@ std::vector<ClockSpan> clockSpans(const Scene& scene) {
         const double start = std::max(0.0, clock->get<double>("startTime"));
         if (clock->get<bool>("enabled") && cycle > 0 && std::isfinite(cycle) &&
             std::isfinite(start))
-            spans.push_back({start, start + cycle});
+            spans.push_back({start, start + cycle, !clock->get<bool>("loop")});
     }
     return spans;
 }

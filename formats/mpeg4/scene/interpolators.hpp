@@ -15,6 +15,7 @@ namespace stx::mpeg4 {
 /// When a clock that drives something begins, and the end of its first cycle; seconds.
 struct ClockSpan {
     double begin = 0, end = 0;
+    bool stops = false;  ///< at that end, which is held then
 };
 /// The spans of all clocks that a route leaves.
 [[nodiscard]] std::vector<ClockSpan> clockSpans(const Scene& scene);

@@ -312,7 +312,7 @@ TEST(Interpolators, MoveWhatRoutesReach) {
 namespace {
 
 /// A scene whose clocks, `count` of them, run for `seconds` each, one after the other.
-Document clocksOf(int count, double seconds) {
+Document clocksOf(int count, double seconds, bool loop = true) {
     NodePtr group = makeNode("Group");
     ReplaceScene scene;
     scene.root = group;
@@ -321,6 +321,7 @@ Document clocksOf(int count, double seconds) {
         NodePtr clock = makeNode("TimeSensor");
         clock->set("cycleInterval", seconds);
         clock->set("startTime", i * seconds);
+        clock->set("loop", loop);
         group->edit<NodeList>("children").push_back(clock);
         scene.routes.push_back({0, "", clock, clock->info->find("fraction_changed"), scalar,
                                 scalar->info->find("set_fraction")});
@@ -328,6 +329,21 @@ Document clocksOf(int count, double seconds) {
     Document document;
     document.frames.push_back({0, {Command(std::move(scene))}});
     return document;
+}
+
+/// A view of one point, at the origin.
+NodePtr viewOfPoint() {
+    PixelImage grey;
+    grey.width = grey.height = grey.components = 1;
+    grey.pixels = {200};
+    const NodePtr depth = makeNode("PixelTexture"), texture = makeNode("SimpleTexture"),
+                  view = makeNode("DepthImage");
+    depth->set("image", grey);
+    texture->set("depth", depth);
+    view->set("diTexture", texture);
+    view->set("orthographic", false);
+    view->set("position", glm::vec3(0));
+    return view;
 }
 
 }  // namespace
@@ -354,6 +370,35 @@ TEST(Mpeg4Sequences, MomentsBeyondAllClocksAreLeftOut) {
     ASSERT_TRUE(sequence) << sequence.error().text();
     EXPECT_EQ((*sequence)->timeline().count(), 5u);
     EXPECT_NEAR((*sequence)->timeline().end, 0.2, 1e-9);
+}
+
+TEST(Mpeg4Sequences, AClockThatStopsHasAMomentAtItsEnd) {
+    // 0.3 s are seven and a half pictures: the end is that of the next, so that all last equally
+    // long. 0.28 * 25 is a little above 7 in doubles.
+    for (const auto& [seconds, last, count] :
+         {std::tuple(2.0, 2.0, 51u), {0.3, 0.32, 9u}, {0.28, 0.28, 8u}}) {
+        Document document = clocksOf(1, seconds, false);
+        auto& scene = std::get<ReplaceScene>(document.frames[0].commands[0]);
+        const NodePtr place = makeNode("Transform"), scalar = makeNode("PositionInterpolator");
+        scalar->set("key", std::vector<float>{0, 1});
+        scalar->set("keyValue", std::vector<glm::vec3>{{0, 0, 0}, {1, 0, 0}});
+        scene.routes[0].to = scalar;
+        scene.routes[0].toField = scalar->info->find("set_fraction");
+        scene.routes.push_back({0, "", scalar, scalar->info->find("value_changed"), place,
+                                place->info->find("translation")});
+        place->set("children", NodeList{viewOfPoint()});
+        scene.root->edit<NodeList>("children").push_back(place);
+        Job job;
+        const auto sequence = sequenceFromScene(document, {}, job);
+        ASSERT_TRUE(sequence) << sequence.error().text();
+        const Timeline& line = (*sequence)->timeline();
+        EXPECT_EQ(line.count(), count) << seconds;
+        EXPECT_NEAR(line.times.back(), last, 1e-9);
+        EXPECT_NEAR(line.rate(), 25, 1e-6) << seconds;
+        const auto frame = (*sequence)->frame(line.count() - 1, job);
+        ASSERT_TRUE(frame) << frame.error().text();
+        EXPECT_EQ(frame->views.at(0).camera.position.x, 1) << seconds;
+    }
 }
 
 TEST(Mpeg4Sequences, AReferenceFileMovesAsItsTextSays) {

@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "formats/files/base64.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
 #include "formats/mpeg4/text/bt.hpp"
 #include "tests/shared_data.hpp"
@@ -284,6 +285,121 @@ TEST(Validate, StructureIsCheckedWithoutDecoding) {
     EXPECT_TRUE(validate(sound(), options, images, job).empty());
     EXPECT_TRUE(
         numbersOf(validate(brokenDocuments().at(4001)(), options, images, job)).contains(4001));
+}
+
+/// Cuts a PNG behind its header, so that it is probed and does not decode.
+void cutPicture(ElementaryStream& stream) {
+    Bytes bytes = *stream.samples[0].data.load(Limits());
+    bytes.resize(60);
+    stream.samples[0].data = ByteRange::of(std::move(bytes));
+}
+Numbers numbersWith(const Document& document, bool pixels) {
+    ValidateOptions options;
+    options.pixels = pixels;
+    Job job;
+    return numbersOf(validate(document, options, {}, job));
+}
+
+TEST(Validate, EachImageOfAViewIsDecoded) {
+    for (const char* field : {"texture", "depth", "normal", "splatU", "splatV"}) {
+        Document document = sound();
+        cutPicture(streamOf(document, field, 1));
+        EXPECT_EQ(numbersWith(document, true), Numbers{4005}) << field;
+        EXPECT_EQ(numbersWith(document, false), Numbers{}) << field;
+    }
+}
+
+TEST(Validate, ImagesOfAnOctreeImageAreDecoded) {
+    Document document = sound(false);
+    const NodePtr octree = makeNode("OctreeImage"), view = viewOf(document);
+    octree->set("octreeResolution", std::int32_t{2});
+    octree->set("octree", std::vector<std::int32_t>{255});
+    view->set("orthographic", true);
+    view->set("fieldOfView", glm::vec2(1.0f, 1.0f));
+    octree->set("images", NodeList{view});
+    rootOf(document)->edit<NodeList>("children")[1] = octree;
+    EXPECT_EQ(numbersWith(document, true), Numbers{});
+    cutPicture(streamOf(document, "texture", 1));
+    EXPECT_EQ(numbersWith(document, true), Numbers{4005});
+    document = sound(false);
+    cutPicture(streamOf(document, "texture"));
+    view->set("diTexture", textureOf(document));
+    rootOf(document)->edit<NodeList>("children")[1] = octree;
+    EXPECT_EQ(numbersWith(document, true), Numbers{4005});
+    EXPECT_EQ(numbersWith(document, false), Numbers{});
+}
+
+TEST(Validate, PicturesOfABackgroundAreDecoded) {
+    Bundle bundle;
+    bundle.views = {makeView(4, 4, 8)};
+    Environment e;
+    e.pictures.assign(6, Texture(Rgba8Image(4, 4, glm::u8vec4(255))));
+    bundle.environment = std::make_shared<const Environment>(e);
+    Document document = sceneOf(bundle);
+    EXPECT_EQ(numbersWith(document, true), Numbers{});
+    int cut = 0;
+    for (const NodePtr& node : rootOf(document)->get<NodeList>("children"))
+        if (node->is("Background"))
+            for (ObjectDescriptor& od : odsOf(document))
+                if (od.id == node->get<std::vector<Url>>("leftUrl").at(0).objectDescriptorId) {
+                    cutPicture(od.streams.at(0));
+                    ++cut;
+                }
+    ASSERT_EQ(cut, 1);
+    EXPECT_EQ(numbersWith(document, true), Numbers{4005});
+    EXPECT_EQ(numbersWith(document, false), Numbers{});
+}
+
+TEST(Validate, ADescriptorOfAnImageHasAStream) {
+    for (const char* field : {"texture", "depth", "splatV"}) {
+        Document document = sound();
+        const int id = textureOf(document)
+                           ->get<NodePtr>(field)
+                           ->get<std::vector<Url>>("url")
+                           .at(0)
+                           .objectDescriptorId;
+        for (ObjectDescriptor& od : odsOf(document))
+            if (od.id == id) od.streams.clear();
+        EXPECT_EQ(numbersWith(document, true), Numbers{2023}) << field;
+        EXPECT_EQ(numbersWith(document, false), Numbers{2023}) << field;
+    }
+    // A stream that is no picture, of which descriptors' rules say nothing.
+    Document document = sound();
+    streamOf(document, "texture").streamType = StreamType::audio;
+    streamOf(document, "texture").samples.clear();
+    EXPECT_EQ(numbersWith(document, true), Numbers{4005});
+    // A stream that is elsewhere.
+    document = sound();
+    streamOf(document, "texture").url = "http://localhost/a.png";
+    streamOf(document, "texture").samples.clear();
+    EXPECT_EQ(numbersWith(document, true), Numbers{4005});
+    // Of a Background.
+    document = fromText(camera("") +
+                        " Background { frontUrl [od:10] backUrl [od:10] leftUrl "
+                        "[od:10] rightUrl [od:10] topUrl [od:10] bottomUrl [od:10] }");
+    ObjectDescriptor od;
+    od.id = 10;
+    document.odFrames = {{0, {UpdateObjectDescriptors{{od}}}}};
+    EXPECT_EQ(numbersWith(document, true), Numbers{2023});
+}
+
+TEST(Validate, MasksInWorldInfoAreDecoded) {
+    const std::vector<std::uint8_t> grey(48, 0);
+    const Bytes png = *encodePng(8, 6, 1, 8, grey.data(), false);
+    const auto noted = [](const std::string& mask) {
+        Document document = sound(false);
+        rootOf(document)
+            ->get<NodeList>("children")
+            .at(0)
+            ->set("info", std::vector<std::string>{"unknown #0 0 " + mask});
+        return document;
+    };
+    EXPECT_EQ(numbersWith(noted("alpha"), true), Numbers{});
+    EXPECT_EQ(numbersWith(noted(encodeBase64(png)), true), Numbers{});
+    const std::string cut = encodeBase64(ByteSpan(png).first(48));
+    EXPECT_EQ(numbersWith(noted(cut), true), Numbers{4005});
+    EXPECT_EQ(numbersWith(noted("no+base64="), true), Numbers{4005});
+    EXPECT_EQ(numbersWith(noted(cut), false), Numbers{});
 }
 
 TEST(Validate, FilesThatCannotBeReadBreakRule1001) {

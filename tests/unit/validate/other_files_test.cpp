@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "formats/any/save.hpp"
+#include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/validate/validate.hpp"
+#include "lib/packing/packing.hpp"
 #include "tests/small_bundle.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/validate/numbers.hpp"
@@ -68,6 +70,33 @@ TEST(ValidateMeshes, AreReadOrBreakRule1001) {
     EXPECT_EQ(rulesOf(folder / "a.obj"), Numbers{});
     std::ofstream(folder / "a.ply") << "ply\nformat ascii 1.0\nelement vertex 3\n";
     EXPECT_EQ(rulesOf(folder / "a.ply"), Numbers{1001});
+}
+
+TEST(ValidateEnvironments, OfBundlesAndAtlasesAreDecoded) {
+    const TemporaryFolder folder;
+    Bundle bundle = smallBundle(1, 16, false, false);
+    Environment environment;
+    environment.pictures.assign(6, Texture(Rgba8Image(4, 4, glm::u8vec4(255))));
+    bundle.environment = std::make_shared<const Environment>(environment);
+    Job job;
+    ASSERT_TRUE(saveBundle(bundle, folder / "bundle.exr", {}, job));
+    const auto atlas = pack(bundle, {}, job);
+    ASSERT_TRUE(atlas) << atlas.error().text();
+    ASSERT_TRUE(writeAtlas(*atlas, folder / "atlas.exr", job));
+    ASSERT_TRUE(writeAtlas(*atlas, folder / "atlas", job));
+    for (const char* name : {"bundle.exr", "atlas.exr", "atlas"}) {
+        EXPECT_EQ(rulesOf(folder / name), Numbers{}) << name;
+        const bool inFolder = std::string_view(name) == "atlas";
+        const auto file = inFolder ? folder / "atlas/environment.exr" : folder / name;
+        // The environment is the last part, and its last byte is one of a picture.
+        std::fstream(file, std::ios::in | std::ios::out | std::ios::binary)
+            .seekp(-1, std::ios::end)
+            .put('!');
+        EXPECT_EQ(rulesOf(folder / name), Numbers{4005}) << name;
+        ValidateOptions headers;
+        headers.pixels = false;
+        EXPECT_EQ(numbersOf(validateFile(folder / name, headers, job)), Numbers{}) << name;
+    }
 }
 
 TEST(ValidateExr, EmptyAndCutFilesBreakRule1001) {
