@@ -165,8 +165,8 @@ void checkMasks(const std::vector<ShownInfo>& infos, const PictureReader& pictur
     for (const ShownInfo& info : infos)
         for (const auto& [key, view] : ViewNotes::parse(info.text).views)
             for (const auto& [number, layer] : view.layers) {
-                const auto where = [&, layer = number](const char* word) {
-                    return fmt::format("WorldInfo: '{} {} {}'", word, key, layer);
+                const auto where = [name = key, at = number](const char* word) {
+                    return fmt::format("WorldInfo: '{} {} {}'", word, name, at);
                 };
                 if (layer.pruned) checkMask(*layer.pruned, where("pruned"), pictures);
                 if (layer.unknown) checkMask(*layer.unknown, where("unknown"), pictures);
