@@ -39,10 +39,11 @@ struct RasterImage {
 struct LoosePoints {
     /// Closes the gaps between them, scene units; 0 when the mesh has none.
     float radius = 0;
-    /// They are too few for that, and stay dots. Dots are balls, which look alike from everywhere:
-    /// of discs that face each camera views deny each other the rims, and surface mode drew a third
-    /// (20.8 instead of 45.1 dB). Where points are dense, discs are nearer to the surface that they
-    /// are of: 22.4 and 28.8 dB for a ball of 3,000 and 30,000 points, 20.3 and 27.4 with bumps.
+    /// They are too few for that, and stay dots, drawn as balls, which look alike from everywhere.
+    /// Discs face their camera, so that each view has other ones: surface mode lost their rims, two
+    /// thirds of each (20.8 instead of 45.1 dB). Where points are dense, discs are nearer to the
+    /// surface that the points are on: 22.4 and 28.8 dB for a ball of 3,000 and 30,000 points, 20.3
+    /// and 27.4 dB with bumps.
     bool apart = false;
 };
 

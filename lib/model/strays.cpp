@@ -53,7 +53,7 @@ Piece pieceOf(const Mesh& mesh, std::uint64_t i) {
 }
 
 /// Of all splats but the strays, as far as they reach. Which are strays goes by their centres: one
-/// far off is no part of the object for being large.
+/// far off is not part of the object because it is large.
 Bounds boundsOfSplats(const Mesh& mesh, const Strays& strays) {
     Bounds bounds;
     std::size_t next = 0;

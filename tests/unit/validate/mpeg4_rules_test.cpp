@@ -363,7 +363,7 @@ TEST(Validate, ADescriptorOfAnImageHasAStream) {
         EXPECT_EQ(numbersWith(document, true), Numbers{2023}) << field;
         EXPECT_EQ(numbersWith(document, false), Numbers{2023}) << field;
     }
-    // A stream that is no picture, of which descriptors' rules say nothing.
+    // A stream that is not a picture: the rules of descriptors do not cover it.
     Document document = sound();
     streamOf(document, "texture").streamType = StreamType::audio;
     streamOf(document, "texture").samples.clear();
