@@ -66,6 +66,34 @@ Result<void> save(Sequence& frames, const std::filesystem::path& target, const S
     return saveSequence(frames, target, options, job);
 }
 
+namespace {
+
+/// Settings of meshes that were given for views, which have cameras and sizes already.
+void noteUnused(const ConvertSettings& given, Job& job) {
+    const ConvertSettings usual;
+    std::vector<const char*> unused;
+    const auto look = [&](auto ConvertSettings::*setting, const char* name) {
+        if (given.*setting != usual.*setting) unused.push_back(name);
+    };
+    look(&ConvertSettings::views, "views");
+    look(&ConvertSettings::names, "names");
+    look(&ConvertSettings::width, "width");
+    look(&ConvertSettings::height, "height");
+    look(&ConvertSettings::orthographic, "orthographic");
+    look(&ConvertSettings::fovRad, "fov");
+    look(&ConvertSettings::elevationRad, "elevation");
+    look(&ConvertSettings::supersampling, "supersampling");
+    look(&ConvertSettings::meshNormals, "mesh normals");
+    look(&ConvertSettings::materials, "materials");
+    look(&ConvertSettings::up, "up");
+    if (!given.cameras.empty()) unused.push_back("cameras");
+    if (!unused.empty())
+        job.note(fmt::format("{} {} of meshes and not used: the model has views already",
+                             fmt::join(unused, ", "), unused.size() == 1 ? "is" : "are"));
+}
+
+}  // namespace
+
 Result<Bundle> convert(Model model, const ConvertSettings& settings, Job& job) {
     if (settings.depthBits && *settings.depthBits != 8 && *settings.depthBits != 16 &&
         *settings.depthBits != 32)
@@ -80,8 +108,10 @@ Result<Bundle> convert(Model model, const ConvertSettings& settings, Job& job) {
         STX_TRY(const auto views, chooseViews(*mesh, settings, job));
         bundle = captureViews(*mesh, views.cameras, settings, job);
     } else if (const auto* atlas = std::get_if<Atlas>(&model)) {
+        noteUnused(settings, job);
         bundle = unpack(*atlas, job);
     } else {
+        noteUnused(settings, job);
         bundle = std::move(std::get<Bundle>(model));
         STX_CHECK(bundle->check());
     }

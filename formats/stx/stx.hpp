@@ -131,8 +131,9 @@ struct ConvertSettings {
 };
 
 /// Captures a mesh from all sides; takes the views out of an atlas; gives a bundle the depth bits
-/// that are asked for. Errors: usage (settings), invalidInput (a mesh that fails check(), no view
-/// sees the object), failed (cancelled), and memory over the limit.
+/// that are asked for. A note names the settings of meshes that were given for one of the latter.
+/// Errors: usage (settings), invalidInput (a mesh that fails check(), no view sees the object),
+/// failed (cancelled), and memory over the limit.
 [[nodiscard]] Result<Bundle> convert(Model model, const ConvertSettings& settings, Job& job);
 
 // bake(Bundle&, BakeSettings, Job&)           normals and splat axes from depth

@@ -46,6 +46,14 @@ class Calls(Case):
             with self.assertRaises(stx.Note):
                 stx.convert(self.mesh, views="ring:2", size=(32, 32), depth_bits=8)
 
+    def test_settings_of_meshes_are_noted_of_views(self):
+        job = stx.Job()
+        bundle = stx.convert(MODEL, views="ring:2", size=(32, 32))
+        stx.convert(bundle, depth_bits=16, job=job)
+        self.assertEqual(job.notes, ())
+        stx.convert(bundle, views="ring:4", size=(32, 512), job=job)
+        self.assertEqual(job.notes, ("views, width are of meshes and not used: the model has views already",))
+
     def test_a_job_keeps_notes_and_tells_progress(self):
         told = []
         job = stx.Job(threads=1, progress=lambda *news: told.append(news))
