@@ -108,6 +108,61 @@ INSTANTIATE_TEST_SUITE_P(Kinds, CoarseViews,
                                          Coarse{"hemiOctahedral", "hemi-octahedral:4", 64}),
                          [](const auto& coarse) { return std::string(coarse.param.name); });
 
+/// A box whose sides are 1.
+Mesh boxMesh() {
+    Mesh mesh;
+    mesh.materials.emplace_back();
+    for (int axis = 0; axis < 3; ++axis) {
+        for (const float side : {-0.5f, 0.5f}) {
+            const int first = static_cast<int>(mesh.positions.size());
+            for (int corner = 0; corner < 4; ++corner) {
+                glm::vec3 at;
+                at[axis] = side;
+                at[(axis + 1) % 3] = ((corner & 1) != 0) == (side > 0) ? 0.5f : -0.5f;
+                at[(axis + 2) % 3] = (corner & 2) ? 0.5f : -0.5f;
+                mesh.positions.push_back(at);
+                mesh.colours.emplace_back(0.7, 0.7, 0.7, 1);
+            }
+            mesh.triangles.emplace_back(first, first + 1, first + 3);
+            mesh.triangles.emplace_back(first, first + 3, first + 2);
+        }
+    }
+    mesh.triangleMaterial.assign(mesh.triangles.size(), 0);
+    return mesh;
+}
+
+// The middle of a tile in which an object ends is outside the views that show that end, where they
+// are as large as the object. Tiles were built from others then: 0.04 % was open.
+TEST(CoarseViews, OutlinesAreDrawnFromViewsThatEndThere) {
+    const Mesh mesh = boxMesh();
+    const BoundingSphere sphere = boundingSphere(mesh.positions);
+    std::vector<Camera> cameras;
+    for (int axis = 0; axis < 3; ++axis) {
+        for (const double side : {-1.0, 1.0}) {
+            for (const double turn : {-0.1, 0.1}) {
+                glm::dvec3 direction;
+                direction[axis] = side;
+                direction[(axis + 1) % 3] = turn;
+                direction[(axis + 2) % 3] = 0.5 * turn;
+                const auto camera = frameCamera(direction, {.width = 192, .height = 192},
+                                                mesh.positions, sphere, true);
+                ASSERT_TRUE(camera);
+                cameras.push_back(*camera);
+            }
+        }
+    }
+    Job job;
+    const auto bundle = captureBundle(mesh, cameras, {}, job);
+    ASSERT_TRUE(bundle);
+    const auto renderer = makeRenderer(Backend::cpu, *bundle, {}, -1, job);
+    ASSERT_TRUE(renderer);
+    const Camera camera = cameraAt(mesh, 40, 300, 20);
+    const auto frame = (*renderer)->render(camera);
+    const auto truth = makeMeshRenderer(mesh, {}, job)->render(camera);
+    ASSERT_TRUE(frame && truth);
+    EXPECT_LE(openShare(*frame, *truth), 0.0001);
+}
+
 // Where links were shares of the distance for any size of pixels, a third of these were none.
 TEST(CoarseViews, OneSurfaceIsLinked) {
     const Bundle bundle = viewsOf(ballMesh(), "ring:3", 32, false);

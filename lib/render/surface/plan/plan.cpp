@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numeric>
 
 #include "lib/base/parallel.hpp"
@@ -55,10 +56,22 @@ std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q, in
     };
     const glm::dvec3 look = towards(frame.space.camera);
     // A source may have been taken from where the frame is seen from, and have looked elsewhere.
-    const auto inPicture = [&](const Source& s) {
-        const glm::dvec4 at = s.space.pixelFromWorld * glm::dvec4(point, 1.0);
-        return at.w > 0 && at.x >= 0 && at.y >= 0 && at.x <= at.w * s.width &&
-               at.y <= at.w * s.height;
+    // Views of an object often end where it does, and the middle of a tile at its outline is
+    // outside.
+    const auto inPicture = [&](const FrameSource& f) {
+        const Source& s = *f.source;
+        const auto x = static_cast<float>(frame.tiles.x(tile)),
+                   y = static_cast<float>(frame.tiles.y(tile));
+        glm::vec2 least(std::numeric_limits<float>::max()), most = -least;
+        for (int corner = 0; corner < 4; ++corner) {
+            const glm::vec4 at = f.sourceFromPixel.homogeneous(
+                x + (corner & 1 ? kTile : 0), y + (corner & 2 ? kTile : 0), static_cast<float>(q));
+            if (!(at.w > 0)) return false;
+            least = glm::min(least, glm::vec2(at) / at.w);
+            most = glm::max(most, glm::vec2(at) / at.w);
+        }
+        return most.x >= 0 && most.y >= 0 && least.x <= static_cast<float>(s.width) &&
+               least.y <= static_cast<float>(s.height);
     };
     // Sources in order of the angle between their line of sight and the novel one. Those that show
     // nothing in the tile come after all others.
@@ -78,7 +91,7 @@ std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q, in
         const auto [rank, i] = left.back();
         left.pop_back();
         const FrameSource& f = frame.sources[static_cast<std::size_t>(i)];
-        if (inPicture(*f.source) && !(frame.effort.preferShown && f.blocksOf(tile).empty()))
+        if (inPicture(f) && !(frame.effort.preferShown && f.blocksOf(tile).empty()))
             chosen.push_back(i);
         else
             idle.emplace_back(rank, i);
