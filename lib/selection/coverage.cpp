@@ -18,6 +18,10 @@ double spread(std::int64_t i, double step) {
     return x - std::floor(x);
 }
 
+/// The least cosine between the normals of a sample and of what is seen in its place. Beside a
+/// right angle the inside of one side is 0 from the outside of the other, which is as far away.
+constexpr double kSameSide = 0.1;
+
 /// What seeing a piece of surface is worth, by how finely it is sampled (1 = as wanted, head-on).
 float worthOf(double sampling) {
     constexpr double kEnough = 0.4, kFiner = 0.1;
@@ -40,6 +44,7 @@ std::vector<SurfaceSample> sampleMesh(const Mesh& mesh, int count) {
     if (total > 0) {
         const double each = total / count;
         double until = 0.5 * each, done = 0;
+        int places = 0;
         for (std::size_t t = 0; t < areas.size(); ++t) {
             done += areas[t];
             const auto& tri = mesh.triangles[t];
@@ -48,15 +53,19 @@ std::vector<SurfaceSample> sampleMesh(const Mesh& mesh, int count) {
             const auto material = mesh.triangleMaterial.empty() ? 0u : mesh.triangleMaterial[t];
             const bool twoSided =
                 material >= mesh.materials.size() || mesh.materials[material].doubleSided;
-            for (; until < done && static_cast<int>(samples.size()) < count; until += each) {
-                const auto i = static_cast<std::int64_t>(samples.size());
+            for (; until < done && places < count; until += each) {
+                const std::int64_t i = places++;
                 double u = spread(i, 0.7548776662466927), v = spread(i, 0.5698402909980532);
                 if (u + v > 1) {
                     u = 1 - u;
                     v = 1 - v;
                 }
                 samples.push_back({a + (b - a) * u + (c - a) * v,
-                                   glm::normalize(glm::cross(b - a, c - a)), each, twoSided});
+                                   glm::normalize(glm::cross(b - a, c - a)), each});
+                if (!twoSided) continue;
+                samples.push_back(samples.back());
+                samples.back().normal = -samples.back().normal;
+                samples.back().otherSide = true;
             }
         }
     }
@@ -100,7 +109,9 @@ Sighting sightingOf(const CandidateView& view, const SurfaceSample& sample) {
         const int x = x0 + (k & 1), y = y0 + (k >> 1);
         if (!view.depth->contains(x, y)) continue;
         const float z = view.depth->at(x, y);
-        s.visible = hasPoint(z) && std::abs(z - pixel.z) <= tolerance;
+        s.visible = hasPoint(z) && std::abs(z - pixel.z) <= tolerance &&
+                    (!view.normal || sample.normal == glm::dvec3(0) ||
+                     glm::dot(glm::dvec3(view.normal->at(x, y)), sample.normal) > kSameSide);
     }
     if (!s.visible) return s;
     const glm::dvec2 fine = view.camera.sampleSpacing(pixel.z);
@@ -239,6 +250,18 @@ std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count) {
     for (const ViewSamples& of : ofViews)
         samples.insert(samples.end(), of.samples.begin(), of.samples.end());
     return samples;
+}
+
+void weighSides(const std::vector<SurfaceSample>& samples, CoverProblem& problem) {
+    std::vector<int> views(samples.size(), 0);
+    for (const auto& view : problem.views)
+        for (const CoverItem& item : view) ++views[item.sample];
+    for (std::size_t i = 1; i < samples.size(); ++i) {
+        if (!samples[i].otherSide) continue;
+        const int most = std::max(views[i - 1], views[i]);
+        if (most > 0) problem.weights[i - 1] *= static_cast<double>(views[i - 1]) / most;
+        problem.weights[i] *= most > 0 ? static_cast<double>(views[i]) / most : 0.0;
+    }
 }
 
 CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,

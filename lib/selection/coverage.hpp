@@ -20,7 +20,8 @@ struct SurfaceSample {
     glm::dvec3 position{0.0};  ///< world
     glm::dvec3 normal{0.0};    ///< unit, world
     double area = 0;           ///< scene units squared
-    bool twoSided = false;     ///< seen from behind as well
+    bool twoSided = false;     ///< of a point, which is seen from any side
+    bool otherSide = false;    ///< of the piece before, seen from behind
 };
 
 /// A view that might be chosen: where its camera would be and what it would see.
@@ -29,10 +30,14 @@ struct CandidateView {
     Camera depthCamera;                   ///< the same view at the resolution of `depth`
     const Image<float>* depth = nullptr;  ///< planar distances, kNoDepth where nothing
     double step = 0;                      ///< of the depth code, scene units; 0 = exact
+    /// Unit, world, towards the camera, where `depth` has a point; may be left out. With them the
+    /// inside of a surface is not seen where its outside is.
+    const Image<glm::vec3>* normal = nullptr;
 };
 
-/// About `count` samples, evenly spread over a mesh's triangles (points of a cloud count as
-/// two-sided pieces of equal area that face every way). Deterministic.
+/// About `count` places, evenly spread over a mesh's triangles (points of a cloud count as
+/// two-sided pieces of equal area that face every way). A triangle that is seen from behind as well
+/// has two samples in each place, one for each side. Deterministic.
 [[nodiscard]] std::vector<SurfaceSample> sampleMesh(const Mesh& mesh, int count);
 
 /// About `count` samples of all that the views of a bundle show. A surface seen by many views
@@ -67,6 +72,12 @@ using SurfaceAt = std::function<std::pair<float, glm::vec2>(int x, int y)>;
 [[nodiscard]] std::vector<SurfaceSample> setAreas(const std::vector<ViewSamples>& ofViews,
                                                   std::span<const std::vector<Sighting>> seen,
                                                   std::int64_t stride);
+
+/// Weighs the two sides of pieces by how many views see each, the one that more see in full: the
+/// inside of what is closed is no surface to look for, and what shows through a narrow gap little
+/// (a teapot whose lid does not close: 44.2 dB by twelve views when it counts in full, 49.5 so). Of
+/// pieces that no view sees, one side counts.
+void weighSides(const std::vector<SurfaceSample>& samples, CoverProblem& problem);
 
 /// The problem of choosing among candidates. How finely a view samples a piece of surface is
 /// s = visible * cosine * min(1, density / target), and its quality 0.9 * min(1, s / 0.4) + 0.1 *

@@ -162,7 +162,7 @@ Result<MeshSelection> selectMeshViews(const Mesh& mesh, const MeshCandidates& ca
 
     const auto count = static_cast<std::int64_t>(cameras.size());
     std::vector<CandidateView> views(cameras.size());
-    std::vector<Image<float>> depths(cameras.size());
+    std::vector<RasterImage> seen(cameras.size());
     std::atomic<std::int64_t> finished = 0;
     const auto looked = parallelTry(0, count, [&](std::int64_t i) -> Result<void> {
         STX_CHECK(job.checkCancelled());
@@ -177,18 +177,23 @@ Result<MeshSelection> selectMeshViews(const Mesh& mesh, const MeshCandidates& ca
             scale < 1 ? camera.resized(shrunk(camera.width), shrunk(camera.height)) : camera;
         RasterSettings raster;
         raster.supersampling = 1;
-        STX_TRY(auto image, rasterise(mesh, views[i].depthCamera, raster, job));
-        depths[i] = std::move(image.depth);
+        raster.normals = true;
+        STX_SET(seen[i], rasterise(mesh, views[i].depthCamera, raster, job));
+        seen[i].colour = {};
         job.progress(++finished, count, "looking from candidate directions");
         return {};
     });
     STX_CHECK(looked);
-    for (std::size_t i = 0; i < views.size(); ++i) views[i].depth = &depths[i];
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        views[i].depth = &seen[i].depth;
+        views[i].normal = &seen[i].normal;
+    }
 
     const auto samples = sampleMesh(mesh, settings.samples);
     if (samples.empty())
         return fail(ErrorCode::invalidInput, "the mesh has no surface to select views for");
-    const auto problem = coverProblem(samples, views, settings.targetDensity);
+    auto problem = coverProblem(samples, views, settings.targetDensity);
+    weighSides(samples, problem);
     STX_CHECK(job.checkCancelled());
     MeshSelection result;
     result.selection = solve(problem, settings);

@@ -282,6 +282,31 @@ TEST(Selection, AroundAMeshSixFacesAndTheCavity) {
     EXPECT_NE(svg.find("</svg>"), std::string::npos);
 }
 
+/// A box without a lid, of sheets without thickness. Each sheet was seen as soon as either side
+/// was: views from below alone saw "100 % of the surface", and pictures from above had 3 dB.
+TEST(Selection, BothSidesOfASheetAreLookedAt) {
+    Mesh mesh = boxInBox();
+    mesh.triangles.resize(12);
+    mesh.triangles.erase(mesh.triangles.begin() + 6, mesh.triangles.begin() + 8);  // +Y
+    mesh.triangleMaterial.assign(mesh.triangles.size(), 0);
+    Job job;
+    SelectSettings settings;
+    settings.samples = 5000;
+    settings.count = 8;
+    const auto s = selectMeshViews(mesh, {}, settings, job);
+    ASSERT_TRUE(s) << s.error().text();
+    EXPECT_GT(s->selection.coverage, 0.99);
+    EXPECT_LT(s->selection.neverSeen, 0.01);
+    const auto from = [&](double least, double most) {
+        return std::ranges::count_if(s->cameras, [&](const Camera& c) {
+            const double up = c.position.y / glm::length(c.position);
+            return up > least && up < most;
+        });
+    };
+    EXPECT_GE(from(0.5, 1), 3);
+    EXPECT_GE(from(-1, 0), 2);
+}
+
 TEST(Selection, SameOnAnyNumberOfThreads) {
     const Mesh mesh = boxInBox();
     Job job;
