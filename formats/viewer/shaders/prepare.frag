@@ -13,7 +13,7 @@ uniform int layer;
 layout(location = 0) out ivec4 slopeOut;
 layout(location = 1) out vec4 normalOut;
 
-const float kSteepest = 8.0, kSteepestRim = 1.0, kCreaseFactor = 3.0, kCreaseMore = 0.5;
+const float kSteepest = 8.0, kAlike = 0.05, kSteepestRim = 1.0, kCreaseFactor = 3.0, kCreaseMore = 0.5;
 const float kNone = 3.0e38;
 
 bool orthographic() { return planes.w != 0.0; }
@@ -42,9 +42,26 @@ vec3 normalFromSlope(vec2 slope, vec3 ray) {
 }
 float tangent(float change, float f, float other) { return other < kNone ? change * (orthographic() ? f : f / other) : kNone; }
 
-float slopeFromNeighbours(float before, float at, float after, float f) {
-    float a = tangent(at - before, f, before), b = tangent(after - at, f, after);
-    bool hasA = abs(a) <= kSteepest, hasB = abs(b) <= kSteepest;
+// Step k along `way`, from pixel k - 1 to pixel k.
+float stepOf(ivec2 at, ivec2 way, int k) {
+    float from = depthOf(at + (k - 1) * way), to = depthOf(at + k * way);
+    return from < kNone ? tangent(to - from, way.x != 0 ? sourceLens.x : sourceLens.y, to) : kNone;
+}
+bool alike(ivec2 at, ivec2 way, int k, float slope, float z) {
+    float there = stepOf(at, way, k);
+    if (!(there < kNone)) return false;
+    return abs(there * (orthographic() ? 1.0 : z / depthOf(at + (k - 1) * way)) - slope) <= kAlike * abs(slope);
+}
+// One surface: not too steep, or three steps alike.
+bool sameAlong(ivec2 at, ivec2 way, float slope, float z) {
+    if (abs(slope) <= kSteepest) return true;
+    if (!(slope < kNone)) return false;
+    int on = 0, back = 0;
+    if (alike(at, way, 2, slope, z)) on = alike(at, way, 3, slope, z) ? 2 : 1;
+    if (alike(at, way, 0, slope, z)) back = alike(at, way, -1, slope, z) ? 2 : 1;
+    return on + back >= 2;
+}
+float slopeFrom(float a, bool hasA, float b, bool hasB) {
     if (hasA && hasB) {
         if (abs(a) > kCreaseFactor * abs(b) + kCreaseMore) return b;
         if (abs(b) > kCreaseFactor * abs(a) + kCreaseMore) return a;
@@ -60,7 +77,13 @@ void main() {
     normalOut = vec4(0.5);
     if (!(z < kNone)) return;
     // Right, left, below, above.
-    vec4 other = vec4(depthOf(at + ivec2(1, 0)), depthOf(at - ivec2(1, 0)), depthOf(at + ivec2(0, 1)), depthOf(at - ivec2(0, 1)));
+    const ivec2 kWays[4] = ivec2[4](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1));
+    vec4 steps;  // away from here
+    bvec4 same;
+    for (int k = 0; k < 4; ++k) {
+        steps[k] = stepOf(at, kWays[k], 1);
+        same[k] = sameAlong(at, kWays[k], steps[k], z);
+    }
     vec3 ray = rayOf(vec2(at));
     vec3 given3 = texelFetch(givenNormals, texelAt(at).xy, 0).xyz;
     bool hasNormal = given.x && given3 != vec3(0.0), hasSplat = false;
@@ -75,20 +98,19 @@ void main() {
     if (!hasSplat && hasNormal)
         slope = slopeFromNormal(transpose(worldFromSource) * normal, ray);
     else if (!hasSplat)
-        slope = vec2(slopeFromNeighbours(other.y, z, other.x, sourceLens.x), slopeFromNeighbours(other.w, z, other.z, sourceLens.y));
+        slope = vec2(slopeFrom(-steps.y, same.y, steps.x, same.x), slopeFrom(-steps.w, same.w, steps.z, same.z));
 
     bool linked = alphaOf(at) >= 1.0;
     bvec4 behind;
     for (int k = 0; k < 4; ++k) {
-        ivec2 beside = at + (k == 0 ? ivec2(1, 0) : k == 1 ? ivec2(-1, 0) : k == 2 ? ivec2(0, 1) : ivec2(0, -1));
+        ivec2 beside = at + kWays[k];
         behind[k] = false;
         if (!shows(beside)) {
             linked = false;
             continue;
         }
-        bool same = abs(tangent(other[k] - z, k < 2 ? sourceLens.x : sourceLens.y, other[k])) <= kSteepest;
-        if (!same || alphaOf(beside) < 1.0) linked = false;
-        behind[k] = !same && other[k] > z;
+        if (!same[k] || alphaOf(beside) < 1.0) linked = false;
+        behind[k] = !same[k] && depthOf(beside) > z;
     }
     // What is one pixel thin has no rim: it would break into dots.
     bool thin = (behind.x && behind.y) || (behind.z && behind.w);

@@ -513,5 +513,56 @@ TEST(CpuSplat, RefusesCamerasAndFramesThatMakeNoSense) {
     EXPECT_NE(huge.error().message.find("frame"), std::string::npos);
 }
 
+/// A plane that a view sees at 86 degrees. Its steps were taken for ends of surfaces, its splats
+/// had no tilt, and from above it was a lattice of holes.
+TEST(Splats, CoverWhatIsSeenEdgeOn) {
+    for (const bool orthographic : {false, true}) {
+        Bundle bundle;
+        bundle.views = {
+            planeView(cameraAt({0, 0, 0}, {0, 0, -1}, 64, orthographic ? 1.0 : 0.25, orthographic),
+                      5, 14, kGrey)};
+        if (!orthographic) bundle.views[0].depthBits = 16;
+        const PageSet set(bundle);
+        const splat::PreparedPages prepared = splat::preparePages(set, false);
+        int linked = 0, tilted = 0, points = 0;
+        for (int y = 1; y < 63; ++y) {
+            for (int x = 4; x < 60; ++x) {
+                if (!hasPoint(bundle.views[0].depth.at(x - 4, y)) ||
+                    !hasPoint(bundle.views[0].depth.at(x + 4, y)))
+                    continue;
+                const splat::Slope s = prepared.pages[0].slopes.data()[64 * y + x];
+                ++points;
+                linked += s.u & splat::Slope::kLinked;
+                tilted += std::abs(s.u) > 5 * splat::kSlopeScale;
+            }
+        }
+        EXPECT_GT(points, 500);
+        EXPECT_EQ(linked, points) << (orthographic ? "orthographic" : "perspective");
+        EXPECT_EQ(tilted, points);
+    }
+}
+
+/// What jumps once, or by way of a pixel between, is two surfaces.
+TEST(Splats, AreNotTiltedAcrossJumps) {
+    const Camera camera = cameraAt({0, 0, 0}, {0, 0, -1}, 64, 0.5);
+    Bundle bundle;
+    bundle.views = {planeView(camera, 5, 0, kGrey)};
+    Image<float>& depth = bundle.views[0].depth;
+    for (int y = 0; y < 64; ++y) {
+        for (int x = 0; x < 64; ++x)
+            if (x > 32) depth.at(x, y) = 7;
+        if (y > 32) depth.at(32, y) = 1 / (0.5f * (1 / 5.0f + 1 / 7.0f));
+    }
+    const PageSet set(bundle);
+    const splat::PreparedPages prepared = splat::preparePages(set, false);
+    for (int y = 1; y < 63; ++y) {
+        for (int x = 30; x < 36; ++x) {
+            const splat::Slope s = prepared.pages[0].slopes.data()[64 * y + x];
+            EXPECT_EQ(s.u & ~1, 0) << x << ", " << y;
+        }
+        EXPECT_FALSE(prepared.pages[0].slopes.data()[64 * y + 33].u & splat::Slope::kLinked);
+    }
+}
+
 }  // namespace
 }  // namespace stx
