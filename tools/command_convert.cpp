@@ -495,13 +495,13 @@ void addSetFiles(Command& c, const std::shared_ptr<ConvertOptions>& o) {
          "Names of the depth images, {name} {w} {h} {format} {frame} in them; --texture "
          "likewise. Both may be films (.mp4, .mov, .mkv, .webm, .avi), of the cameras in IN. Of "
          "a photo: the picture of its depth, {stem} in it the photo's name")
-        .takes("PATTERN");
+        .reads("PATTERN");
     c.option("--mask", set.maskPattern,
              "Names of pictures that are white where the object is, {stem} of the colour picture's "
              "file or {name} in them, beside the set or in the current folder; 'stx background "
              "--mask-of "
              "all' makes such masks")
-        .takes("PATTERN");
+        .reads("PATTERN");
     c.choice<std::optional<NoDepth>>(
         "--no-depth", set.noDepth,
         {{"auto", std::nullopt}, {"unknown", NoDepth::unknown}, {"empty", NoDepth::empty}},
@@ -557,7 +557,7 @@ void addSetCameras(Command& c, const std::shared_ptr<ConvertOptions>& o) {
              "Where that camera is: a text file with rows of R t, a point p of the depth camera "
              "being R p + t in the colour camera (x right, y down, z forward), or none: depth lies "
              "on the pixels of its picture (default: 7-Scenes' known one)")
-        .takes("FILE|none");
+        .reads("FILE|none");
     c.option("--focal", set.focal, "Focal length of older Middlebury sets, pixels").positive();
     c.option("--baseline", set.baseline, "From the first to the last view of those sets")
         .positive();
@@ -590,14 +590,14 @@ void addConvert(CommandLine& line, Program& program) {
              "What to write; {stem} is an input's name, {dir} its folder, {parent} "
              "that folder's name")
         .required()
-        .takes("OUT");
+        .replaces("OUT");
     addMeshViewOptions(c, o->mesh);
     c.flag("--times-from-start", o->open.timesFromStart,
            "MPEG-4: startTime and stopTime that come with a later access unit count from the "
            "start, and not from that unit");
     c.under(MeshViewOptions::kHeading)
         .option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
-        .takes("IMAGE");
+        .reads("IMAGE");
     addCodingOptions(c.under("Coding"), o);
     addEnvironmentOptions(
         c, o->environment,

@@ -329,7 +329,7 @@ void addExtract(CommandLine& line, Program& program) {
              "Folder, points.ply, points.drc, cloud.spz, model.glb, view.html, or a picture with "
              "depth: NAME.jpg, NAME_rgbd.png")
         .required()
-        .takes("OUT");
+        .writes("OUT");
     c.option(
          "--cameras", o->cameras,
          "Camera file in the folder: transforms (nerfstudio), miv, or colmap (a dense workspace) "
