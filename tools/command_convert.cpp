@@ -6,6 +6,7 @@
 #include "formats/any/open.hpp"
 #include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
+#include "formats/exr/bundle_exr.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/stx/mesh_views.hpp"
@@ -80,13 +81,22 @@ constexpr const char* kSetHeading = "Image sets";
 /// What an input is read as.
 enum class Reads { mesh, moment, film };
 
+/// Whether an input is read as an image set. An .exr is a bundle or a picture with Z.
+bool isSet(const std::filesystem::path& input, const Result<FileKind>& kind,
+           const ConvertOptions& o, const Limits& limits) {
+    if (!o.open.set.from.empty() || !kind || *kind == FileKind::imageSet ||
+        *kind == FileKind::photo)
+        return true;
+    if (*kind != FileKind::exr) return false;
+    const auto reader = ExrReader::open(input, limits);
+    return !reader || exrViewParts(*reader).empty();
+}
+
 /// Options that were given but do not matter to this input: lists of many inputs may hold others.
 void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptions& o,
                 Program& program) {
     const auto kind = recognise(input);
-    // An .exr is a bundle or a picture with Z.
-    const bool set = !o.open.set.from.empty() || !kind || *kind == FileKind::imageSet ||
-                     *kind == FileKind::exr || *kind == FileKind::photo;
+    const bool set = isSet(input, kind, o, program.job.limits);
     const auto note = [&](const std::vector<std::string>& options, const char* ofWhat,
                           const char* isWhat) {
         if (options.empty()) return;
@@ -100,6 +110,11 @@ void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptio
         if (set) std::erase(options, "--texture");
         if (kind && *kind == FileKind::photo) std::erase(options, "--fov");
         note(options, "meshes", kind ? nameOf(*kind) : "none");
+    } else {
+        std::vector<std::string> options;
+        if (o.refining.steps != "auto" && o.refining.steps != "off") options = {"--refine"};
+        if (o.cube) options.push_back("--cube");
+        note(options, "inputs with views", nameOf(FileKind::mesh));
     }
     if (set) return;
     auto options = o.givenOfSets;
