@@ -371,10 +371,10 @@ void addExtract(CommandLine& line, Program& program) {
         .takes("N");
     c.option(
          "--colour", o->colour,
-         "Of .html and of surfaces (.glb): png (exact) or jpeg (default png; of surfaces with "
-         "--triangles jpeg; .html copies the JPEG pictures of an input that has such, unless png "
-         "or --quality is given). In the folder, of colours in linear light and of 16 bits: exr "
-         "(exact) or png (16-bit sRGB, exact for what was that) (default exr)")
+         "Of .html and of surfaces (.glb): png (exact) or jpeg; .html copies the JPEG pictures of "
+         "an input that has such, unless png or --quality is given. In the folder, of colours in "
+         "linear light and of 16 bits: exr (exact) or png (16-bit sRGB, exact for what was that) "
+         "(default: of .html and surfaces png, with --triangles jpeg; in the folder exr)")
         .oneOf({"png", "jpeg", "exr"});
     c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100);
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
