@@ -8,6 +8,32 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 view="--orbit 4 --elevation 23 --size 512x512 --background 0,0,0 --quiet"
 
+# The files that a model names, a line each: its pictures, and with "all" its buffers, too.
+parts() { # MODEL pictures|all
+    python3 -c '
+import json, os, re, sys, urllib.parse
+model, which = sys.argv[1:]
+beside = lambda name: os.path.join(os.path.dirname(model), name)
+ending, names = os.path.splitext(model)[1].lower(), []
+if ending == ".gltf":
+    with open(model, encoding="utf-8") as file:
+        scene = json.load(file)
+    named = scene.get("images", []) + (scene.get("buffers", []) if which == "all" else [])
+    names = [urllib.parse.unquote(n["uri"]) for n in named if not n.get("uri", "data:").startswith("data:")]
+elif ending == ".obj":
+    lines = lambda path: open(path, encoding="utf-8", errors="replace")
+    for materials in [line.split(None, 1)[1].strip() for line in lines(model) if line.startswith("mtllib ")]:
+        if not os.path.exists(beside(materials)):
+            continue
+        # A name comes after options such as "-bm 2" and "-s 1 1 1".
+        named = (re.match(r"\s*(?:map_\S+|bump|disp|decal|norm|refl)\s+(?:-[a-z]+\s+(?:(?:[-+.\d]+|on|off|[rgbmlz])\s+)*)*(.+)", line)
+                 for line in lines(beside(materials)))
+        names += [match[1].strip().replace("\\", "/") for match in named if match]
+print("\n".join(sorted({beside(name) for name in names})))' "$1" "$2"
+}
+sized() { # FILE, and names of others on stdin
+    { cat "$1"; while IFS= read -r part; do test -z "$part" || cat "$part"; done; } | wc -c
+}
 bytes() { find "$@" -type f -exec cat {} + | wc -c; }
 row() { # NAME FILE
     # shellcheck disable=SC2086
@@ -24,16 +50,11 @@ echo "|---|---|---|---|"
 for model in "$@"; do
     model=$(realpath "$model")
     name=$(basename "$model" | sed 's/\.[^.]*$//')
-    folder=$(dirname "$model")
-    parts=$(find "$folder" -maxdepth 1 -name '*.bin' -o -maxdepth 1 -name '*.png' -o -maxdepth 1 -name '*.jpg')
-    # shellcheck disable=SC2086
-    echo "| $name | the model and its pictures | $(bytes "$model" $parts) | |"
+    echo "| $name | the model and its pictures | $(parts "$model" all | sized "$model") | |"
     # draco_encoder takes OBJ, not glTF.
     if (cd "$work" && assimp export "$model" draco.obj && draco_encoder -i draco.obj -o draco.drc -cl 10) > "$work/log" 2>&1
     then
-        pictures=$(find "$folder" -maxdepth 1 -name '*.png' -o -maxdepth 1 -name '*.jpg')
-        # shellcheck disable=SC2086
-        echo "| $name | .drc and its pictures | $(bytes "$work/draco.drc" $pictures) | |"
+        echo "| $name | .drc and its pictures | $(parts "$model" pictures | sized "$work/draco.drc") | |"
     fi
     # shellcheck disable=SC2086
     stx render "$model" -o "$work/truth_%04d.png" $view

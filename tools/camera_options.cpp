@@ -116,7 +116,7 @@ void addCameraOptions(const Command& command, CameraOptions& o) {
          "--cameras", o.cameraFile,
          "Every camera of a file (transforms.json, camera_path.json, MIV JSON, cameras.json) or "
          "of a COLMAP model")
-        .takes("FILE");
+        .reads("FILE");
     c.choice<bool>(
         "--camera-poses", o.aligned, {{"given", false}, {"aligned", true}},
         "What the cameras of the file lie beside: given (the views as their image set had "
@@ -125,7 +125,7 @@ void addCameraOptions(const Command& command, CameraOptions& o) {
     c.option("--dataparser", o.dataparser,
              "dataparser_transforms.json of the training that a camera_path.json belongs to "
              "(default: one beside it): its cameras then are in the world of the images")
-        .takes("FILE");
+        .reads("FILE");
     c.option("--size", o.size,
              "Size of the picture (default: that of the camera, else 512x512). Where its shape "
              "is not the camera's, more is seen on the longer side: nothing is squeezed or cut")

@@ -240,12 +240,7 @@ Result<int> backgroundOfFrames(const BackgroundOptions& o, Program& program) {
     const Stopwatch watch;
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(frameFormat(o.output));
-    if (!o.confidence.empty()) {
-        STX_CHECK(checkPngTarget("--confidence", o.confidence, program));
-        if (o.confidence == o.output)
-            return fail(ErrorCode::usage, "-o and --confidence are both '{}'; give them two names",
-                        o.output);
-    }
+    if (!o.confidence.empty()) STX_CHECK(checkPngTarget("--confidence", o.confidence, program));
     const std::vector<std::filesystem::path> inputs(o.inputs.begin(), o.inputs.end());
     preloadCodecs(inputs[0]);
     STX_TRY(auto frames, openVideoFrames(inputs, program.job, o.strict));
@@ -309,7 +304,7 @@ void addMaskOptions(Command c, const std::shared_ptr<BackgroundOptions>& o) {
     c.option("--mask-output", o->maskOutput,
              "Names of the masks; %04d is the frame, {stem} the name of its file "
              "(default: the name of -o with _mask_%04d.png)")
-        .takes("PATTERN");
+        .writes("PATTERN");
 }
 
 /// Of the method `select`.
@@ -378,7 +373,7 @@ void addBackground(CommandLine& line, Program& program) {
              ".xmt, .bt, name_%04d.exr); of a bundle of one photograph: it with a view of what it "
              "hides (.exr, too)")
         .required()
-        .takes("IMAGE");
+        .replaces("IMAGE");
     c.option(
          "--method",
          [o](const std::string& text) -> Result<void> {
@@ -399,7 +394,7 @@ void addBackground(CommandLine& line, Program& program) {
     c.flag("--strict", o->strict, "Frames that are missing or damaged are errors");
     c.option("--confidence", o->confidence,
              "Write how far frames agree with each pixel: 0 (none) to 255 (all)")
-        .takes("FILE.png");
+        .writes("FILE.png");
     addMaskOptions(c.under("Masks"), o);
     addSelectOptions(c.under("Method select"), o);
     addFilmOptions(c.under("Bundles with time"), o);

@@ -67,7 +67,7 @@ void addBake(CommandLine& line, Program& program) {
     c.option("BUNDLE", o->input, "Bundle to bake").required();
     c.option("-o,--output", o->output, "Bundle to write (.exr, .mp4, .xmt, .bt)")
         .required()
-        .takes("OUT");
+        .replaces("OUT");
     c.option("--method", o->method,
              "robust: local fit that respects edges and depth steps; paper: differences to "
              "the 4 neighbours (default robust)")

@@ -296,10 +296,10 @@ void addCompare(CommandLine& line, Program& program) {
     auto o = std::make_shared<CompareOptions>();
     c.option("A", o->a, "Image, sequence as name_%04d.png, or folder").required();
     c.option("B", o->b, "The same").required();
-    c.option("--mask", o->mask, "Image; only pixels that are white in it count").takes("IMAGE");
+    c.option("--mask", o->mask, "Image; only pixels that are white in it count").reads("IMAGE");
     c.option("--error-picture", o->errorPicture,
              "Write where they differ as a PNG, of folders into one")
-        .takes("FILE.png");
+        .writes("FILE.png");
     c.option("--gain", o->gain, "Of the error picture (default 8)").range(0.001, 1e6);
     c.option(
          "--background", o->background,

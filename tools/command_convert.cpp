@@ -6,6 +6,7 @@
 #include "formats/any/open.hpp"
 #include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
+#include "formats/exr/bundle_exr.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/stx/mesh_views.hpp"
@@ -80,13 +81,22 @@ constexpr const char* kSetHeading = "Image sets";
 /// What an input is read as.
 enum class Reads { mesh, moment, film };
 
+/// Whether an input is read as an image set. An .exr is a bundle or a picture with Z.
+bool isSet(const std::filesystem::path& input, const Result<FileKind>& kind,
+           const ConvertOptions& o, const Limits& limits) {
+    if (!o.open.set.from.empty() || !kind || *kind == FileKind::imageSet ||
+        *kind == FileKind::photo)
+        return true;
+    if (*kind != FileKind::exr) return false;
+    const auto reader = ExrReader::open(input, limits);
+    return !reader || exrViewParts(*reader).empty();
+}
+
 /// Options that were given but do not matter to this input: lists of many inputs may hold others.
 void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptions& o,
                 Program& program) {
     const auto kind = recognise(input);
-    // An .exr is a bundle or a picture with Z.
-    const bool set = !o.open.set.from.empty() || !kind || *kind == FileKind::imageSet ||
-                     *kind == FileKind::exr || *kind == FileKind::photo;
+    const bool set = isSet(input, kind, o, program.job.limits);
     const auto note = [&](const std::vector<std::string>& options, const char* ofWhat,
                           const char* isWhat) {
         if (options.empty()) return;
@@ -100,6 +110,11 @@ void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptio
         if (set) std::erase(options, "--texture");
         if (kind && *kind == FileKind::photo) std::erase(options, "--fov");
         note(options, "meshes", kind ? nameOf(*kind) : "none");
+    } else {
+        std::vector<std::string> options;
+        if (o.refining.steps != "auto" && o.refining.steps != "off") options = {"--refine"};
+        if (o.cube) options.push_back("--cube");
+        note(options, "inputs with views", nameOf(FileKind::mesh));
     }
     if (set) return;
     auto options = o.givenOfSets;
@@ -495,13 +510,13 @@ void addSetFiles(Command& c, const std::shared_ptr<ConvertOptions>& o) {
          "Names of the depth images, {name} {w} {h} {format} {frame} in them; --texture "
          "likewise. Both may be films (.mp4, .mov, .mkv, .webm, .avi), of the cameras in IN. Of "
          "a photo: the picture of its depth, {stem} in it the photo's name")
-        .takes("PATTERN");
+        .reads("PATTERN");
     c.option("--mask", set.maskPattern,
              "Names of pictures that are white where the object is, {stem} of the colour picture's "
              "file or {name} in them, beside the set or in the current folder; 'stx background "
              "--mask-of "
              "all' makes such masks")
-        .takes("PATTERN");
+        .reads("PATTERN");
     c.choice<std::optional<NoDepth>>(
         "--no-depth", set.noDepth,
         {{"auto", std::nullopt}, {"unknown", NoDepth::unknown}, {"empty", NoDepth::empty}},
@@ -557,7 +572,7 @@ void addSetCameras(Command& c, const std::shared_ptr<ConvertOptions>& o) {
              "Where that camera is: a text file with rows of R t, a point p of the depth camera "
              "being R p + t in the colour camera (x right, y down, z forward), or none: depth lies "
              "on the pixels of its picture (default: 7-Scenes' known one)")
-        .takes("FILE|none");
+        .reads("FILE|none");
     c.option("--focal", set.focal, "Focal length of older Middlebury sets, pixels").positive();
     c.option("--baseline", set.baseline, "From the first to the last view of those sets")
         .positive();
@@ -590,14 +605,14 @@ void addConvert(CommandLine& line, Program& program) {
              "What to write; {stem} is an input's name, {dir} its folder, {parent} "
              "that folder's name")
         .required()
-        .takes("OUT");
+        .replaces("OUT");
     addMeshViewOptions(c, o->mesh);
     c.flag("--times-from-start", o->open.timesFromStart,
            "MPEG-4: startTime and stopTime that come with a later access unit count from the "
            "start, and not from that unit");
     c.under(MeshViewOptions::kHeading)
         .option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
-        .takes("IMAGE");
+        .reads("IMAGE");
     addCodingOptions(c.under("Coding"), o);
     addEnvironmentOptions(
         c, o->environment,

@@ -329,7 +329,7 @@ void addExtract(CommandLine& line, Program& program) {
              "Folder, points.ply, points.drc, cloud.spz, model.glb, view.html, or a picture with "
              "depth: NAME.jpg, NAME_rgbd.png")
         .required()
-        .takes("OUT");
+        .writes("OUT");
     c.option(
          "--cameras", o->cameras,
          "Camera file in the folder: transforms (nerfstudio), miv, or colmap (a dense workspace) "
@@ -371,10 +371,10 @@ void addExtract(CommandLine& line, Program& program) {
         .takes("N");
     c.option(
          "--colour", o->colour,
-         "Of .html and of surfaces (.glb): png (exact) or jpeg (default png; of surfaces with "
-         "--triangles jpeg; .html copies the JPEG pictures of an input that has such, unless png "
-         "or --quality is given). In the folder, of colours in linear light and of 16 bits: exr "
-         "(exact) or png (16-bit sRGB, exact for what was that) (default exr)")
+         "Of .html and of surfaces (.glb): png (exact) or jpeg; .html copies the JPEG pictures of "
+         "an input that has such, unless png or --quality is given. In the folder, of colours in "
+         "linear light and of 16 bits: exr (exact) or png (16-bit sRGB, exact for what was that) "
+         "(default: of .html and surfaces png, with --triangles jpeg; in the folder exr)")
         .oneOf({"png", "jpeg", "exr"});
     c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100);
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);

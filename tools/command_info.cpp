@@ -72,11 +72,7 @@ Result<std::string> plotOf(const nlohmann::ordered_json& found, const InfoComman
 }
 
 Result<int> info(const InfoCommandOptions& o, Program& program) {
-    if (!o.plot.empty()) {
-        if (!o.plot.ends_with(".svg"))
-            return fail(ErrorCode::usage, "--cameras is '{}'; its name must end in .svg", o.plot);
-        STX_CHECK(checkTarget(o.plot, program));
-    }
+    STX_CHECK(checkPlotTarget("--cameras", o.plot, program));
     STX_TRY(const auto found, describe(o.input, o.info, program.job));
     if (!o.plot.empty()) {
         STX_TRY(const auto svg, plotOf(found, o, program));
@@ -111,7 +107,7 @@ void addInfo(CommandLine& line, Program& program) {
            "once to find whether they would be refined");
     c.option("--cameras", o->plot,
              "Draw the cameras around the object, from above and from the side, as an SVG picture")
-        .takes("FILE.svg");
+        .writes("FILE.svg");
     c.objectOption(o->info.object);
     c.sharedOptions(program.common, kFormat | kOutside);
     c.runs([o](Program& p) { return info(*o, p); });

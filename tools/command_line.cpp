@@ -7,6 +7,7 @@
 
 #include "tools/build_text.hpp"
 #include "tools/help_text.hpp"
+#include "tools/output_names.hpp"
 #include "tools/program.hpp"
 #include "tools/standard_streams.hpp"
 
@@ -92,6 +93,29 @@ Error unknownCommand(const std::string& name, const std::vector<std::string>& kn
             {}};
 }
 
+/// What an option names; of a list, @LIST, its file.
+void addNamedPaths(const CLI::Option& option, bool replaces, std::vector<NamedPath>& to) {
+    if (option.count() == 0) return;
+    const std::string name = option.get_positional() ? "" : optionRow(option).names.front();
+    for (const std::string& text : option.reduced_results())
+        to.push_back({name, text.substr(text.starts_with('@') ? 1 : 0), replaces});
+}
+
+Result<void> checkPaths(const CLI::App& app, const PathOptions& paths) {
+    std::vector<NamedPath> inputs, outputs;
+    for (const CLI::Option* option : app.get_options([](const CLI::Option* o) {
+             return o->get_positional() && optionRow(*o).choices.empty();
+         }))
+        addNamedPaths(*option, false, inputs);
+    for (const auto* option : paths.inputs) addNamedPaths(*option, false, inputs);
+    for (const auto* option : paths.outputs)
+        addNamedPaths(*option, option == paths.replacing, outputs);
+    STX_CHECK(checkOutputNames(outputs, inputs));
+    for (const NamedPath& output : outputs)
+        if (output.option == "--report") STX_CHECK(checkReportName(output.path));
+    return {};
+}
+
 Error usageError(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
     const CLI::App& where = chosen(app);
     std::string message = error.what();
@@ -134,6 +158,18 @@ Error usageError(const CLI::App& app, const CLI::ParseError& error, int argc, ch
 Option& Option::takes(const std::string& what) {
     option_->type_name(what);
     return *this;
+}
+Option& Option::reads(const std::string& what) {
+    paths_->inputs.push_back(option_);
+    return takes(what);
+}
+Option& Option::writes(const std::string& what) {
+    paths_->outputs.push_back(option_);
+    return takes(what);
+}
+Option& Option::replaces(const std::string& what) {
+    paths_->replacing = option_;
+    return writes(what);
 }
 Option& Option::required() {
     option_->required();
@@ -181,7 +217,7 @@ Option Command::added(CLI::Option* option, bool lastCounts) const {
     if (!heading_.empty()) option->group(heading_);
     if (lastCounts && !option->get_positional())
         option->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-    return Option(option);
+    return {option, *paths_};
 }
 
 template <class Value>
@@ -233,7 +269,7 @@ void Command::sharedOptions(CommonOptions& to, unsigned which) {
         c.flag("--no-clobber", to.noClobber, "Refuse to replace existing files");
         c.flag("--no-mkdir", to.noMkdir, "Refuse to make folders of outputs that are not there");
         c.option("--report", to.report, "Write what was done as JSON to this file")
-            .takes("FILE.json");
+            .writes("FILE.json");
     }
     if (which & kFormat)
         c.option("--format", to.format, "text or json (default text)").oneOf({"text", "json"});
@@ -292,8 +328,8 @@ CommandLine::~CommandLine() = default;
 
 Command CommandLine::add(const std::string& name, const std::string& help) {
     CLI::App* app = app_->add_subcommand(name, help);
-    entries_.push_back({app, std::make_unique<Command::Body>()});
-    return {app, *entries_.back().body};
+    entries_.push_back({app, std::make_unique<Command::Body>(), std::make_unique<PathOptions>()});
+    return {app, *entries_.back().body, *entries_.back().paths};
 }
 
 Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
@@ -311,10 +347,31 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
     } catch (const CLI::ParseError& e) {
         return tl::unexpected(usageError(*app_, e, argc, argv));
     }
-    for (const auto& entry : entries_)
-        if (entry.app->parsed()) return Request{{}, *entry.body, entry.app->get_name()};
+    for (const auto& entry : entries_) {
+        if (!entry.app->parsed()) continue;
+        STX_CHECK(checkPaths(*entry.app, *entry.paths));
+        return Request{{}, *entry.body, entry.app->get_name()};
+    }
     return fail(ErrorCode::usage, "no command was given. See 'stx --help'.");
 }
+
+namespace {
+
+/// Whether a word beside --report names the file of the report, too.
+bool namesOther(const std::vector<std::string_view>& words, const std::string& report) {
+    for (std::size_t i = 1; i < words.size(); ++i) {
+        std::string_view word = words[i];
+        if (word.starts_with("--report") || words[i - 1] == "--report") continue;
+        if (word.starts_with("--"))
+            word.remove_prefix(std::min(word.find('='), word.size() - 1) + 1);
+        else if (word.starts_with('-') || word.starts_with('@'))
+            word.remove_prefix(word.starts_with('@') ? 1 : std::min<std::size_t>(2, word.size()));
+        if (samePath(std::string(word), report)) return true;
+    }
+    return false;
+}
+
+}  // namespace
 
 CommandLine::FailedRequest CommandLine::failedRequest(int argc, char** argv) const {
     FailedRequest request;
@@ -336,6 +393,7 @@ CommandLine::FailedRequest CommandLine::failedRequest(int argc, char** argv) con
         else if (rest.empty() && i + 1 < words.size() && !words[i + 1].starts_with('-'))
             request.report = words[++i];
     }
+    if (!checkReportName(request.report) || namesOther(words, request.report)) request.report = {};
     return request;
 }
 

@@ -25,13 +25,27 @@ class Program;
 struct CommonOptions;
 enum class HelpDetail;
 
+/// The options of a command whose values name files and folders, beside positionals, which all name
+/// inputs unless they are words from a list.
+struct PathOptions {
+    std::vector<const CLI::Option*> inputs, outputs;
+    const CLI::Option* replacing = nullptr;  ///< the output that may take the input's place
+};
+
 /// An option that was just added, to say more about it.
 class Option {
   public:
-    explicit Option(CLI::Option* option) : option_(option) {}
+    Option(CLI::Option* option, PathOptions& paths) : option_(option), paths_(&paths) {}
 
     /// What it takes, for people: "WxH".
     Option& takes(const std::string& what);
+    /// The same of what names an input: no output may have its place.
+    Option& reads(const std::string& what);
+    /// The same of what names an output: it has the place neither of an input nor of another one.
+    Option& writes(const std::string& what);
+    /// The same of an output that is of the input's kind: where there is one input, it may have its
+    /// place, since files are written beside it and renamed at the end.
+    Option& replaces(const std::string& what);
     Option& required();
     /// One value with commas in it is several.
     Option& commaSeparated();
@@ -47,6 +61,7 @@ class Option {
 
   private:
     CLI::Option* option_;
+    PathOptions* paths_;
 };
 
 /// Which of the shared options a command has beside --threads, --max-memory, --quiet, -v.
@@ -63,7 +78,8 @@ class Command {
   public:
     using Body = std::function<Result<int>(Program&)>;
 
-    Command(CLI::App* app, Body& body) : app_(app), body_(&body) {}
+    Command(CLI::App* app, Body& body, PathOptions& paths)
+        : app_(app), body_(&body), paths_(&paths) {}
 
     /// The same command, whose further options the help lists under this heading.
     [[nodiscard]] Command under(const std::string& heading) const;
@@ -115,6 +131,7 @@ class Command {
 
     CLI::App* app_;
     Body* body_;
+    PathOptions* paths_;
     std::string heading_;  ///< empty: that of CLI11
 };
 
@@ -156,14 +173,16 @@ class CommandLine {
         std::string command;  ///< its name
     };
     /// Errors (usage) in one line that says where to read on, with the nearest known word for an
-    /// unknown one.
+    /// unknown one; also where an output would take the place of an input or of another output.
     [[nodiscard]] Result<Request> parse(int argc, char** argv) const;
 
     /// What the arguments say of the report of a command line that parse() refused. They are read
     /// word by word, since the parse may have stopped before them.
     struct FailedRequest {
         std::string command;  ///< empty: none that there is
-        std::string report;   ///< of --report; empty: none, or the command has no report
+        /// Of --report; empty: none, the command has no report, or it has no right place: another
+        /// word names that file, or it has the name of a picture or a model.
+        std::string report;
         bool noClobber = false;
     };
     [[nodiscard]] FailedRequest failedRequest(int argc, char** argv) const;
@@ -179,6 +198,7 @@ class CommandLine {
     struct Entry {
         CLI::App* app;
         std::unique_ptr<Command::Body> body;
+        std::unique_ptr<PathOptions> paths;
     };
     std::unique_ptr<CLI::App> app_;
     std::vector<Entry> entries_;

@@ -187,7 +187,7 @@ void addPanorama(CommandLine& line, Program& program) {
              "(.exr), MPEG-4 scene with a Background (.mp4, .bt, .xmt), or a folder for the six "
              "faces of a cube: front, back, left, right, top, bottom, as a Background has them")
         .required()
-        .takes("OUT");
+        .writes("OUT");
     c.option(
          "--fov",
          [o](const std::string& text) -> Result<void> {
@@ -219,7 +219,7 @@ void addPanorama(CommandLine& line, Program& program) {
          "--into", o->into,
          "Bundle or film that OUT is to be, with the panorama as its environment; BUNDLE itself "
          "stays as it is")
-        .takes("BUNDLE");
+        .reads("BUNDLE");
     c.flag("--leave-one-out", o->leaveOneOut,
            "Draws each picture again out of a panorama of the others: how near they come (dB) is "
            "told, and in the report of each");

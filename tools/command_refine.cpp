@@ -173,7 +173,7 @@ void addRefine(CommandLine& line, Program& program) {
     c.option("IN", o->input, "Bundle, film, atlas or image set").required();
     c.option("-o,--output", o->output, "Bundle to write (.exr, .mp4, .xmt, .bt)")
         .required()
-        .takes("OUT");
+        .replaces("OUT");
     c.option("--only", o->only, "These steps, with commas between them").takes("STEPS");
     c.option("--with", o->with, "These steps, too").takes("STEPS");
     c.option("--without", o->without, "None of these steps").takes("STEPS");

@@ -441,7 +441,7 @@ void addOutput(Command c, RenderOptions& o) {
            "MPEG-4: startTime and stopTime that come with a later access unit count from the "
            "start, and not from that unit");
     c.option("--texture", o.open.texture, "Texture of a mesh, in place of those that it names")
-        .takes("IMAGE");
+        .reads("IMAGE");
 }
 
 }  // namespace
@@ -458,7 +458,7 @@ void addRender(CommandLine& line, Program& program) {
     c.option("IN", o->input, "Bundle, atlas or mesh");
     c.option("-o,--output", o->output,
              ".png, .jpg, .exr, .tif or .webp; name_%04d.png for several; - for a y4m stream")
-        .takes("IMAGE");
+        .writes("IMAGE");
     addCameraOptions(c, o->camera);
     c.under("Camera").choice<bool>(
         "--projection", o->around, {{"perspective", false}, {"equirectangular", true}},

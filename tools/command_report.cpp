@@ -108,15 +108,15 @@ void addReport(CommandLine& line, Program& program) {
     c.option("ACTION", o->action, "What to do").required().oneOf({"merge"});
     c.option("REPORTS", o->files, "Reports of 'stx convert' or 'stx render', made with --shard")
         .required();
-    c.option("-o,--output", o->output, "Write the joined report").takes("FILE");
+    c.option("-o,--output", o->output, "Write the joined report").writes("FILE");
     c.option("--inputs", o->inputs, "The inputs as they were given to 'stx convert', for names")
-        .takes("@LIST");
+        .reads("@LIST");
     c.option("--missing", o->missing,
              "Write the names of the inputs that are missing or failed, as a list to convert")
-        .takes("FILE");
+        .writes("FILE");
     c.option("--outputs", o->outputs,
              "Write the names of the outputs that are done or skipped, a line each")
-        .takes("FILE");
+        .writes("FILE");
     c.flag("--no-clobber", program.common.noClobber, "Refuse to replace existing files");
     c.sharedOptions(program.common, kFormat);
     c.runs([o](Program& p) { return report(*o, p); });

@@ -106,6 +106,7 @@ bool mayGoOneByOne(const ViewTable& table) {
 Result<int> select(const SelectOptions& o, const Command& command, Program& program) {
     const Stopwatch watch;
     STX_CHECK(checkTarget(o.output, program));
+    STX_CHECK(checkPlotTarget("--plot", o.plot, program));
     STX_CHECK(containerOf(o.output));
     preloadCodecs(o.input);
     const auto kind = recognise(o.input);
@@ -192,7 +193,7 @@ void addSelect(CommandLine& line, Program& program) {
     auto o = std::make_shared<SelectOptions>();
     c.option("IN", o->input, "Bundle or film to choose from, or a mesh to look at from all sides")
         .required();
-    c.option("-o,--output", o->output, "Bundle to write").required().takes("OUT");
+    c.option("-o,--output", o->output, "Bundle to write").required().replaces("OUT");
     c.option("--count", o->settings.count, "Number of views to keep").range(1, 65536).takes("N");
     c.option("--share", o->sharePercent,
              "Keep as many as reach this much of the quality of all views, in percent (default 95)")
@@ -201,7 +202,7 @@ void addSelect(CommandLine& line, Program& program) {
     c.option("--density", o->settings.targetDensity,
              "Wanted samples per scene unit (default: what the views typically have)")
         .notNegative();
-    c.option("--plot", o->plot, "Draw quality against the number of views").takes("FILE.svg");
+    c.option("--plot", o->plot, "Draw quality against the number of views").writes("FILE.svg");
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return select(*o, c, p); });

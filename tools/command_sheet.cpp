@@ -201,7 +201,7 @@ void addSheet(CommandLine& line, Program& program) {
     c.option("IN", o->inputs,
              "Bundle, atlas, image set or what moves; or two of them, or two pictures, to compare")
         .required();
-    c.option("-o,--output", o->output, "Picture to write (.png)").required().takes("SHEET.png");
+    c.option("-o,--output", o->output, "Picture to write (.png)").required().writes("SHEET.png");
     c.option("--size", o->size, "The sheet is at most this large (default 2600x2600)").takes("WxH");
     c.option("--columns", o->settings.columns,
              "Views beside each other; of what moves: moments (default: what fills the sheet best, "

@@ -19,7 +19,7 @@ Result<glm::dvec3> upOf(const EnvironmentOptions& options) {
 
 void addEnvironmentOptions(const Command& command, EnvironmentOptions& options, const char* help) {
     Command c = command.under("Environment: what is behind everything, infinitely far away");
-    c.option("--environment", options.file, help).takes("FILE|none");
+    c.option("--environment", options.file, help).reads("FILE|none");
     c.option("--environment-up", options.up,
              "Direction of the scene that is up in the environment: Z, X,Y,Z or with a minus "
              "--environment-up=-Y (default Y)")

@@ -115,7 +115,8 @@ void addMeshViewOptions(const Command& command, const std::shared_ptr<MeshViewOp
     c.option("--views", o->views,
              "cube, ring:N, sphere:N, octahedral:N, hemi-octahedral:N (grids of N x N), auto:N "
              "(the N best), auto:DBdB (the fewest that reach this PSNR) or a camera file "
-             "(default sphere:16)");
+             "(default sphere:16)")
+        .reads("WORD");
     c.option("--size", o->size,
              "Size of each view (default 512x512; of a camera file: what it says)")
         .takes("WxH");
@@ -144,7 +145,7 @@ void addMeshViewOptions(const Command& command, const std::shared_ptr<MeshViewOp
            "Keep metallic-roughness (glTF) and the light that is given off as images of their "
            "own, for engines (.exr; from there atlases); colour is then without that light");
     c.option("--plot", o->plot, "With auto: draw quality against the number of views")
-        .takes("FILE.svg");
+        .writes("FILE.svg");
     c.under("Coding")
         .option("--depth-bits", o->depthBits, "8, 16 or 32 (float, .exr only); default 16")
         .oneOf({8, 16, 32});
@@ -155,6 +156,7 @@ Result<void> checkMeshViewOptions(const MeshViewOptions& o, const Command& comma
     STX_TRY(const auto automatic, parseAutoViews(o.views));
     STX_CHECK(settingsOf(o, program));
     if (!automatic) STX_CHECK(command.refuse({"--plot"}, "is of --views auto:N"));
+    STX_CHECK(checkPlotTarget("--plot", o.plot, program));
     const auto layout = parseViewLayout(o.views);
     if (automatic || (layout && layout->kind != ViewLayout::Kind::ring))
         STX_CHECK(command.refuse({"--elevation"}, "is of --views ring:N"));

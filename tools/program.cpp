@@ -11,10 +11,12 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/decoders/decoder_process.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/files/source_date.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
 #include "lib/base/whole_number.hpp"
+#include "tools/output_names.hpp"
 #include "tools/standard_streams.hpp"
 #include "tools/stop_signals.hpp"
 
@@ -411,12 +413,6 @@ std::uint64_t bytesOf(const std::filesystem::path& path) {
 
 Result<std::string> folderTarget(const std::string& target, const std::vector<std::string>& files,
                                  std::string_view expected) {
-    // What people give to other programs; a folder's name may have any other dot in it.
-    static const std::vector<std::string> kFiles = {
-        ".png",  ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".exr",  ".hdr", ".svg", ".mp4",
-        ".bt",   ".xmt", ".json", ".txt", ".obj",  ".glb",  ".gltf", ".stl", ".ply", ".drc",
-        ".html", ".off", ".dae",  ".fbx", ".zip",  ".tar",  ".gz",   ".yuv", ".y4m", ".pfm",
-        ".bin",  ".tga", ".bmp",  ".gif", ".psd",  ".mkv",  ".mov",  ".avi", ".webm"};
     if (target == "-")
         return fail(ErrorCode::usage,
                     "-o is '-', standard output, which takes one stream; {} is expected (-o ./- "
@@ -427,15 +423,21 @@ Result<std::string> folderTarget(const std::string& target, const std::vector<st
     std::error_code ec;
     if (path != target || std::filesystem::is_directory(path, ec)) return path;
     const auto ending = std::filesystem::path(path).extension().string();
-    const auto among = [&](const std::vector<std::string>& list) {
-        return std::find(list.begin(), list.end(), ending) != list.end();
-    };
-    if (among(kFiles) && !among(files))
+    // What people give to other programs; a folder's name may have any other dot in it.
+    const bool file = !endingOfMedia(path).empty() || ending == ".json" || ending == ".txt";
+    if (file && std::ranges::none_of(files, [&](auto& f) { return equalNoCase(f, ending); }))
         return fail(ErrorCode::usage,
                     "-o '{}' ends in '{}', like a file; {} is expected (a slash at its end makes "
                     "any name a folder's)",
                     target, ending, expected);
     return path;
+}
+
+Result<void> checkPlotTarget(std::string_view option, const std::string& target, Program& program) {
+    if (target.empty()) return {};
+    if (!target.ends_with(".svg"))
+        return fail(ErrorCode::usage, "{} is '{}'; its name must end in .svg", option, target);
+    return checkTarget(target, program);
 }
 
 Result<void> checkTarget(const std::filesystem::path& target, Program& program) {

@@ -119,5 +119,8 @@ class Program {
 /// the target's folder; (io) under --no-clobber, when the target exists; (usage) several numbers in
 /// its name.
 [[nodiscard]] Result<void> checkTarget(const std::filesystem::path& target, Program& program);
+/// The same of a plot, where one was asked for; errors (usage) also when it is no .svg.
+[[nodiscard]] Result<void> checkPlotTarget(std::string_view option, const std::string& target,
+                                           Program& program);
 
 }  // namespace stx::tools

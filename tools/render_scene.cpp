@@ -135,6 +135,21 @@ RenderSettings settingsOf(const RenderSettings& asked, const DrawnScene& scene) 
     return settings;
 }
 
+/// Errors (usage): a film of pictures of two sizes.
+Result<void> checkFilmSize(const RenderOptions& o, const std::vector<NovelCamera>& pictures) {
+    if (o.output != "-" || o.fileFormat != "y4m" || pictures.empty()) return {};
+    const Camera& first = pictures.front().camera;
+    const auto other = std::ranges::find_if(pictures, [&](const NovelCamera& p) {
+        return p.camera.width != first.width || p.camera.height != first.height;
+    });
+    if (other == pictures.end()) return {};
+    return fail(ErrorCode::usage,
+                "a film has pictures of one size, and camera 0 is {}x{}, camera {} {}x{}; give "
+                "--size",
+                first.width, first.height, other - pictures.begin(), other->camera.width,
+                other->camera.height);
+}
+
 }  // namespace
 
 Result<void> checkPictures(const RenderOptions& o, const RenderSettings& asked,
@@ -147,6 +162,7 @@ Result<void> checkPictures(const RenderOptions& o, const RenderSettings& asked,
         STX_CHECK(within(fmt::format("camera {}", i), camera.check()));
         largest = std::max(largest, static_cast<std::uint64_t>(camera.width) * camera.height);
     }
+    STX_CHECK(checkFilmSize(o, pictures));
     auto fits = limits.checkAllocation(largest, kBytesPerPixel, "the picture");
     if (fits || !scene.table) return fits;
     const RenderSettings settings = settingsOf(asked, scene);

@@ -65,8 +65,8 @@ struct DrawnScene {
 [[nodiscard]] Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& settings,
                                            const Command& command, Program& program);
 
-/// Errors: Camera::check(); (invalidInput) a picture takes more than the limit. Where drawing it
-/// takes even more, as far as that is known, the error says so.
+/// Errors: Camera::check(); (usage) a film of two sizes; (invalidInput) a picture takes more than
+/// the limit. Where drawing it takes even more, as far as that is known, the error says so.
 [[nodiscard]] Result<void> checkPictures(const RenderOptions& o, const RenderSettings& settings,
                                          const std::vector<NovelCamera>& pictures,
                                          const DrawnScene& scene, const Limits& limits);

@@ -67,6 +67,9 @@ Result<std::vector<Camera>> orbitCameras(glm::dvec3 centre, double radius,
     if (count < 1 || count > kMostCameras)
         return fail(ErrorCode::usage, "an orbit of {} cameras is asked for; 1 to {} are possible",
                     count, kMostCameras);
+    if (orbit.distance == 0 && !std::isfinite(radius))
+        return fail(ErrorCode::usage, "the sphere's radius is {:g}; a finite number is expected",
+                    radius);
     const double distance =
         orbit.distance > 0 ? orbit.distance : framingDistance(std::max(radius, 1e-9), s);
     const glm::dquat toUp = rotationToUp(s.up);

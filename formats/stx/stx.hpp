@@ -187,8 +187,8 @@ struct CameraSettings {
     glm::dvec3 up{0, 1, 0};  ///< what is up in the picture; need not be orthogonal
 };
 
-/// A camera at `eye` that looks at `target`, both in the world. Errors (usage): they coincide, or
-/// settings out of range.
+/// A camera at `eye` that looks at `target`, both in the world. Errors (usage): they coincide,
+/// are not finite or lie 1e150 and more apart, or settings out of range.
 [[nodiscard]] Result<Camera> cameraAt(glm::dvec3 eye, glm::dvec3 target,
                                       const CameraSettings& settings);
 
@@ -203,7 +203,8 @@ struct OrbitSettings {
                           ///< the narrower side of the frame
 };
 
-/// The cameras of an orbit around a sphere. Errors (usage): settings out of range.
+/// The cameras of an orbit around a sphere. Errors (usage): settings out of range, or a radius that
+/// is not finite.
 [[nodiscard]] Result<std::vector<Camera>> orbitCameras(glm::dvec3 centre, double radius,
                                                        const OrbitSettings& orbit,
                                                        const CameraSettings& settings);

@@ -85,13 +85,22 @@ Result<void> Camera::check() const {
 }
 
 Result<glm::dquat> lookAt(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up) {
+    const auto text = [](glm::dvec3 v) {
+        return fmt::format("({:.10g},{:.10g},{:.10g})", v.x, v.y, v.z);
+    };
+    for (const auto& [name, v] : {std::pair{"eye", eye}, std::pair{"target", target}})
+        if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z))
+            return fail(ErrorCode::usage, "the camera's {} is {}; finite numbers are expected",
+                        name, text(v));
     const glm::dvec3 toEye = eye - target;
     const double distance = glm::length(toEye);
-    if (!(distance > 0) || !std::isfinite(distance))
-        return fail(
-            ErrorCode::usage,
-            "the camera's eye and target are the same point ({:.10g},{:.10g},{:.10g}); move one",
-            eye.x, eye.y, eye.z);
+    if (!std::isfinite(distance))
+        return fail(ErrorCode::usage,
+                    "the camera's eye {} and target {} are too far apart; move one", text(eye),
+                    text(target));
+    if (!(distance > 0))
+        return fail(ErrorCode::usage, "the camera's eye and target are the same point {}; move one",
+                    text(eye));
     const glm::dvec3 z = toEye / distance;
     glm::dvec3 x = glm::cross(up, z);
     if (!(glm::length(x) > 1e-9 * glm::length(up))) {

@@ -75,7 +75,8 @@ struct Camera {
 };
 
 /// Orientation of a camera at `eye` that looks at `target`; `up` need not be orthogonal. Errors
-/// when eye and target coincide; an `up` along the line of sight is replaced by another axis.
+/// (usage) when they coincide, are not finite or lie 1e150 and more apart; an `up` along the line
+/// of sight is replaced by another axis.
 [[nodiscard]] Result<glm::dquat> lookAt(glm::dvec3 eye, glm::dvec3 target,
                                         glm::dvec3 up = {0, 1, 0});
 

@@ -330,6 +330,7 @@ Result<std::int64_t> giveAwayTo(std::int64_t budget, std::vector<PruneView>& vie
         now.rateTolerance = std::max(now.rateTolerance, 2.0);
     giveAway(views, rank, now);
     STX_CHECK(job.checkCancelled());
+    bool coarsely = false;
     if (countKept(views) > budget) {
         // Coarser and less alike replacements, rather than an object with holes. From the start:
         // what the first round locked would be in the way.
@@ -337,9 +338,7 @@ Result<std::int64_t> giveAwayTo(std::int64_t budget, std::vector<PruneView>& vie
         now.rateTolerance = 1e6;
         now.colourTolerance = 1;
         giveAway(views, rank, now);
-        job.note(
-            "the pruning budget is met only by giving away pixels that other views show more "
-            "coarsely");
+        coarsely = true;
     }
     const std::int64_t kept = countKept(views);
     if (kept > budget)
@@ -348,6 +347,10 @@ Result<std::int64_t> giveAwayTo(std::int64_t budget, std::vector<PruneView>& vie
             "a budget of {} pixels is too small: the views show {} pixels of surface that only "
             "one of them sees, and pruning leaves no holes; allow at least that many",
             budget, kept);
+    if (coarsely)
+        job.note(
+            "the pruning budget is met only by giving away pixels that other views show more "
+            "coarsely");
     return kept;
 }
 

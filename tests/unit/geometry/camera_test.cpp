@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
+
 #include "lib/geometry/depth_code.hpp"
 #include "lib/geometry/view_layout.hpp"
 
@@ -41,6 +44,18 @@ TEST(Camera, LookAtPointsTheAxisAtTheTarget) {
         EXPECT_LT(glm::length(*q * glm::dvec3(0, 0, -1) - glm::normalize(-eye)), 1e-12);
     }
     EXPECT_FALSE(lookAt({1, 1, 1}, {1, 1, 1}));
+}
+
+TEST(Camera, LookAtSaysWhyNot) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(lookAt({nan, 0, 1}, {0, 0, 0}).error().message,
+              "the camera's eye is (nan,0,1); finite numbers are expected");
+    EXPECT_EQ(lookAt({0, 0, 1}, {0, -INFINITY, 0}).error().message,
+              "the camera's target is (0,-inf,0); finite numbers are expected");
+    EXPECT_EQ(lookAt({1e300, 0, 1}, {0, 0, 0}).error().message,
+              "the camera's eye (1e+300,0,1) and target (0,0,0) are too far apart; move one");
+    EXPECT_EQ(lookAt({1, 2, 3}, {1, 2, 3}).error().message,
+              "the camera's eye and target are the same point (1,2,3); move one");
 }
 
 TEST(Camera, AxisAngleRoundTrips) {

@@ -162,11 +162,13 @@ TEST(Prune, BudgetsAndQualitiesAreKept) {
     settings.minPsnr = 0;
     settings.budget = 50;
     Bundle tiny = before;
+    (void)job.takeNotes();
     const auto c = prune(tiny, settings, job);
     ASSERT_FALSE(c);
     EXPECT_EQ(c.error().code, ErrorCode::invalidInput);
     EXPECT_NE(c.error().message.find("a budget of 50 pixels is too small"), std::string::npos);
     EXPECT_EQ(tiny.pointCount(), before.pointCount()) << "nothing is touched on an error";
+    EXPECT_TRUE(job.takeNotes().empty()) << "no note says that the budget is met";
 }
 
 TEST(Prune, AQualityThatNothingReachesKeepsAll) {

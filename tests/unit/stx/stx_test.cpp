@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <numbers>
 
 #include "formats/stx/mesh_views.hpp"
@@ -172,6 +173,8 @@ TEST(Stx, CamerasLookAtTheirTargetAndHoldTheSphere) {
     EXPECT_EQ(cameraAt({0, 0, 5}, {0, 0, 0}, lens).error().code, ErrorCode::usage);
     EXPECT_EQ(cameraAt({1, 1, 1}, {1, 1, 1}, {}).error().code, ErrorCode::usage);
     EXPECT_EQ(orbitCameras({}, 1, 0, 0, {}).error().code, ErrorCode::usage);
+    EXPECT_EQ(orbitCameras({}, std::numeric_limits<double>::quiet_NaN(), 1, 0, {}).error().message,
+              "the sphere's radius is nan; a finite number is expected");
 }
 
 TEST(Stx, RendererKeepsItsModel) {
