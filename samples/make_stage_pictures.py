@@ -23,7 +23,7 @@ SIDE, PART, ZOOM = 240, 56, 2  # pixels of a frame and of the part that is shown
 VIEWS = 160                    # pixels of a view
 # Where another capture than the one that changes most says more of what a stage is for.
 SHOWN_OF = {"unmeasured": "unmeasured", "surroundings": "room", "levels": "exact", "sharpen": "exact", "settle": None, "exposure": "exposed",
-            "strays": "noisy", "nearer": "exact", "closing": "few", "mean": "exact", "rims": "alone"}
+            "strays": "noisy", "nearer": "exact", "closing": "few", "mean": "exact", "rims": "alone", "coarse": "mixed"}
 RANDOM = np.random.default_rng(7)
 
 
@@ -112,6 +112,8 @@ def captures(folder):
         "exposed": (exposed(stx.convert(model, views="sphere:16", size=(256, 256))), around), "fat": (fat(sphere), around),
         "glass": (glass(sphere), around), "room": (room, inside), "unmeasured": (unmeasured(room), inside), "apart": (apart(room), inside),
         "alone": (stx.Bundle([room.views[0]]), inside),
+        "mixed": (stx.Bundle([*sphere.views, *(stx.View(v.colour, v.depth, v.camera, name="coarse")
+                                               for v in stx.convert(model, views="ring:1", size=(12, 12)).views)]), around),
     }
 
 

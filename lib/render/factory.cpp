@@ -198,7 +198,15 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
         const StageTimer timer(settings.log.get(), "twins", true);
         return settings.does(Stage::twins) ? set.distinct() : set;
     }();
-    const PageSet captured = solid(inFront(distinct, settings, job));
+    const PageSet fine = [&] {
+        if (!settings.does(Stage::coarse) || !isOurs(backend, settings)) return distinct;
+        StageTimer timer(settings.log.get(), "coarse", true);
+        std::int64_t points = 0;
+        PageSet views = distinct.withoutCoarse(settings.mode == RenderMode::splat, points);
+        timer.changed(points);
+        return views;
+    }();
+    const PageSet captured = solid(inFront(fine, settings, job));
     STX_TRY(PageSet drawn, refined(captured));
     if (drawn.behind()) {
         STX_TRY(PageSet behind, refined(solid(*drawn.behind())));

@@ -24,6 +24,7 @@ Outcome crop(Pictures& pictures);
 Outcome otherOrder(Pictures& pictures);
 Outcome viewTwice(Pictures& pictures);
 Outcome viewOfNothing(Pictures& pictures);
+Outcome viewOfFewPixels(Pictures& pictures);
 Outcome turned(Pictures& pictures);
 Outcome scaled(Pictures& pictures);
 Outcome movedFar(Pictures& pictures);

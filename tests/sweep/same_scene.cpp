@@ -123,6 +123,22 @@ Outcome viewTwice(Pictures& pictures) {
     return worseThanBefore(pictures, how, changed);
 }
 
+Outcome viewOfFewPixels(Pictures& pictures) {
+    const Captured& captured = pictures.captured();
+    const std::size_t which =
+        static_cast<std::size_t>(pick(pictures, 35, int(captured.bundle.views.size())));
+    const Camera& fine = captured.bundle.views[which].camera;
+    const int fewer = 3 + pick(pictures, 36, 8);
+    Bundle bundle = captured.bundle;
+    bundle.views.push_back(look(captured.scene, fine.resized(std::max(1, fine.width / fewer),
+                                                             std::max(1, fine.height / fewer))));
+    bundle.views.back().name = "few pixels";
+    bundle.views.back().depthBits = captured.bundle.views[which].depthBits;
+    const Drawn how = modeOf(pictures, 37);
+    STX_TRY(const Frame changed, drawBundle(bundle, captured.novel, how));
+    return worseThanBefore(pictures, how, changed);
+}
+
 Outcome viewOfNothing(Pictures& pictures) {
     return changedScene(pictures, 41, [](Bundle& bundle, Camera&) {
         ReferenceView nothing = bundle.views[0];

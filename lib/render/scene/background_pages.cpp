@@ -65,6 +65,7 @@ PageSet PageSet::only(const std::vector<bool>& kept) const {
             if (page < 0) {
                 page = static_cast<int>(data->pages.size());
                 data->pages.push_back(data_->pages[r.page]);
+                if (!data_->captured.empty()) data->captured.push_back(data_->captured[r.page]);
             }
             r.page = page;
             r.view = static_cast<int>(data->views.size());

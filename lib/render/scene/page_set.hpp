@@ -140,6 +140,11 @@ class PageSet {
     /// where `captured`, these views before they were refined, has no such pixels; `pixels` tells
     /// how many.
     [[nodiscard]] PageSet withUnmeasured(const PageSet& captured, std::int64_t& pixels) const;
+    /// The same without views of whose points all are shown at least twice as finely by others:
+    /// large splats stick out beyond outlines that finer views know, and depth of large pixels
+    /// says little. With `single`, such points of other views are left out, too; surface mode would
+    /// take what they leave for free. `points` tells how many.
+    [[nodiscard]] PageSet withoutCoarse(bool single, std::int64_t& points) const;
     /// Scene units: points of withUnmeasured() farther than half of this are "far away", since
     /// nobody knows where they are. 0 for other sets.
     [[nodiscard]] double farAway() const { return data_->farAway; }
@@ -239,7 +244,8 @@ class PageSet {
         /// The copies of textures that solid(), inLightOf() and inOneLight() made.
         std::vector<std::shared_ptr<const Texture>> changed;
         std::vector<const Texture*> captured;  ///< by page; empty: those of the pages
-        std::vector<std::shared_ptr<const Image<float>>> refined;  ///< depth of refined()
+        std::vector<std::shared_ptr<const Image<float>>>
+            refined;  ///< depth of refined() and withoutCoarse()
     };
     explicit PageSet(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
     [[nodiscard]] PageSet only(const std::vector<bool>& kept) const;

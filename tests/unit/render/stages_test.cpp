@@ -78,6 +78,10 @@ std::vector<Shot> shots() {
     for (ReferenceView& view : apart.bundle.views) view.noDepth = NoDepth::unknown;
     for (float& depth : apart.bundle.views[1].depth.pixels()) depth *= 1.008f;
     all.push_back(apart);
+    Shot mixed = ofObject(8, 96);
+    mixed.bundle.views.push_back(viewOfAnalyticScene(
+        AnalyticScene::object, analyticCamera(AnalyticScene::object, 2, 8).resized(12, 12), 2));
+    all.push_back(mixed);
     Shot alone = ofRoom();
     alone.bundle.views.resize(1);
     all.push_back(alone);

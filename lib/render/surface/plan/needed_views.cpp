@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
+#include "lib/render/scene/coarse_pages.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "lib/render/surface/prepare/constants.hpp"
 
@@ -98,10 +99,13 @@ bool sees(const ReferenceView& view, const ViewSummary& summary, double least,
     return false;
 }
 
-bool anyTwins(const std::vector<ReferenceView>& views) {
+/// Whether there are views that may be left out for others (stages `twins` and `coarse`).
+bool anyForOthers(const std::vector<ReferenceView>& views) {
     for (std::size_t i = 0; i < views.size(); ++i)
         for (std::size_t k = 0; k < i; ++k)
-            if (sameCamera(views[i].camera, views[k].camera)) return true;
+            if (sameCamera(views[i].camera, views[k].camera) ||
+                isClearlyFiner(views[i], views[k]) || isClearlyFiner(views[k], views[i]))
+                return true;
     return false;
 }
 
@@ -119,7 +123,7 @@ std::vector<bool> neededViews(const std::vector<ReferenceView>& views,
     const bool splats = settings.mode == RenderMode::splat;
     // The paper's rule is fitted to all views, and points know each other by their number.
     if ((splats && settings.splat != SplatRule::data) || summaries.size() != views.size() ||
-        anyTwins(views))
+        anyForOthers(views))
         return needed;
     for (std::size_t i = 0; i < views.size(); ++i)
         if (!tellsWithoutPixels(views[i]) || summaries[i].translucent) return needed;

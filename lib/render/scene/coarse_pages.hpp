@@ -1,0 +1,12 @@
+#pragma once
+
+#include "lib/model/reference_view.hpp"
+
+namespace stx {
+
+/// Whether a view has its samples at least twice as close together wherever it sees something, as
+/// another does anywhere: PageSet::withoutCoarse() may leave out points of that. Told without
+/// pixels.
+[[nodiscard]] bool isClearlyFiner(const ViewHeader& view, const ViewHeader& than);
+
+}  // namespace stx
