@@ -260,6 +260,7 @@ class Viewer {
         words.push(`--fov ${Number(c.fov.toFixed(4))}`, `--size ${width}x${height}`,
                    `--background ${look.background.map((x) => Number(x.toFixed(4))).join(",")}`);
         if (this.data.frames.length > 1) words.push(`--time ${this.data.times[this.frame]}`);
+        if (this.data.without) words.push(`--without ${this.data.without}`);
         if (look.light.on)
             words.push(`--light=dir:${this.plain(look.light.direction)}`, `--ambient ${look.light.ambient}`,
                        `--specular ${look.light.specular}`, `--shininess ${look.light.shininess}`);

@@ -212,6 +212,22 @@ def photo(test, browser):
         test.check(share <= most, f"from beside by {percent} %: {100 * share:.4f} % of the page is open")
 
 
+def captured(test, browser, args):
+    """What a depth camera has no depth of is drawn where stx draws it."""
+    kitchen = os.path.join(args.shared, "data/imagesets/7scenes-kitchen")
+    if not os.path.isdir(kitchen):
+        return
+    test.stx_run("convert", kitchen, "-o", "kitchen.exr")
+    test.stx_run("extract", "kitchen.exr", "-o", "kitchen.html")
+    show(browser, test.path("kitchen.html"), f"size={SIZE}&ui=off&background=%23000000")
+    browser.ask("viewer.fromView('0')")
+    drawn(browser)
+    browser.picture(test.path("shot.png"), *map(int, SIZE.split("x")))
+    test.stx_run(*shlex.split(browser.ask("viewer.command()"))[1:], "--backend", "cpu")
+    found = psnr(test.stx, "shot.png", "view.png", test.folder)
+    test.check(found >= LEAST, f"a kitchen of which some has no depth: {found:.1f} dB")
+
+
 def odd_addresses(test, browser):
     """What codes nothing is passed over; nothing that the page does is against its own policy."""
     for address in ("%", "eye=%E0%A4%A&fov=%", "eye=1,2&up=x&=&&"):
@@ -274,6 +290,7 @@ def main():
             touched(test, browser)
             single(test, browser)
             photo(test, browser)
+            captured(test, browser, args)
             odd_addresses(test, browser)
             phone(test, browser)
             test.check(not browser.faults, f"no fault is logged: {browser.faults[:3]}")
