@@ -76,6 +76,7 @@ class Painter {
         this.outline = make("outline.vert", "outline.frag", 0);
         this.silhouettes = make("screen.vert", "silhouettes.frag", 0);
         this.present = make("screen.vert", "present.frag", 0);
+        this.mostSide = gl.getParameter(gl.MAX_TEXTURE_SIZE);
         this.mostReach = gl.getParameter(gl.ALIASED_POINT_SIZE_RANGE)[1] / 2;
         this.blockList = gl.createBuffer();
         this.blockArray = gl.createVertexArray();
@@ -118,7 +119,7 @@ class Painter {
         this.frames = [frontFrame, frameOf(colour, normal), frameOf(pictures[0]), frameOf(pictures[1]),
                        frameOf(colour), frameOf(normal)];
         if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE)
-            throw new Error("this device cannot draw into textures of floats");
+            throw new Error(`this device cannot draw into textures of floats of ${width}x${height} pixels`);
     }
 
     // Blocks that may be in sight, and the farthest distance of any.
@@ -185,8 +186,7 @@ class Painter {
         const ratio = scene.samplesPerPixel(camera);
         if (!(ratio > 1.5)) return 1;
         let factor = Math.round(Math.min(ratio, 16));
-        const side = this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE);
-        while (factor > 1 && (camera.width * camera.height * factor * factor > 16e6 || Math.max(camera.width, camera.height) * factor > side)) --factor;
+        while (factor > 1 && (camera.width * camera.height * factor * factor > 16e6 || Math.max(camera.width, camera.height) * factor > this.mostSide)) --factor;
         return factor;
     }
 

@@ -35,6 +35,8 @@ class Viewer {
         message.className = failed ? "failed" : "";
     }
 
+    fail(error) { this.say("The page cannot be drawn: " + error.message, true); }
+
     // ---- Time ----
 
     async sceneOf(number) {
@@ -179,7 +181,11 @@ class Viewer {
         if (!this.waiting) {
             this.waiting = requestAnimationFrame(() => {
                 this.waiting = 0;
-                this.draw();
+                try {
+                    this.draw();
+                } catch (error) {
+                    this.fail(error);
+                }
             });
         }
         clearTimeout(this.rest);
@@ -234,8 +240,10 @@ class Viewer {
         if (splat && splat[0] > 0) document.getElementById("splat-size").value = splat[0];
         if (light && lengthOf(light) > 0) this.setLight(light);
         for (const name of ["ambient", "specular"]) if (numbers(name, 1)) document.getElementById(name).value = numbers(name, 1)[0];
-        const size = (fields.get("size") || "").match(/^(\d{1,5})x(\d{1,5})$/);
+        const size = (fields.get("size") || "").match(/^(\d+)x(\d+)$/), most = this.painter.mostSide;
         this.size = size ? [Number(size[1]), Number(size[2])] : null;
+        if (size && !this.size.every((side) => side >= 1 && side <= most))
+            throw new Error(`#size=${size[0]} is not possible; on this device sides have 1 to ${most} pixels`);
         if (size) Object.assign(this.canvas.style, {width: size[1] + "px", height: size[2] + "px"});
         if (/^#[0-9a-f]{6}$/i.test(fields.get("background") || "")) this.background = fields.get("background");
         if (fields.get("ui") === "off") document.getElementById("panel").hidden = true;
@@ -311,7 +319,13 @@ class Viewer {
         on("view", "change", () => this.fromView(document.getElementById("view").value));
         on("panel", "submit", (event) => event.preventDefault());
         window.addEventListener("hashchange", () => {
-            this.readAddress();
+            try {
+                this.readAddress();
+                if (document.getElementById("message").className === "failed") this.say("");
+            } catch (error) {
+                this.size = null;
+                this.fail(error);
+            }
             this.showFrame(this.frame);
         });
         window.addEventListener("resize", () => this.redraw());
@@ -403,8 +417,7 @@ document.body.insertAdjacentHTML("afterbegin", kPanel);
 document.querySelector("h1").textContent = document.title;
 const viewer = new Viewer();
 viewer.start().catch((error) => {
-    const old = error.message === "no WebGL 2";
-    viewer.say(old ? "This page needs WebGL 2, which this browser does not have or has switched off. Current versions of " +
-        "Firefox, Chrome, Edge and Safari have it; look whether hardware acceleration is on."
-        : "The page cannot be drawn: " + error.message, true);
+    if (error.message !== "no WebGL 2") return viewer.fail(error);
+    viewer.say("This page needs WebGL 2, which this browser does not have or has switched off. Current versions of " +
+        "Firefox, Chrome, Edge and Safari have it; look whether hardware acceleration is on.", true);
 });

@@ -233,6 +233,20 @@ def odd_addresses(test, browser):
     for address in ("%", "eye=%E0%A4%A&fov=%", "eye=1,2&up=x&=&&"):
         show(browser, test.path("amphora.html"), address)
         test.check(browser.ask("viewer.camera.fov > 0"), f"a page draws at #{address}")
+    for size in ("0x0", "99999x99999", "1x100000"):
+        try:
+            show(browser, test.path("amphora.html"), f"size={size}")
+            said = "nothing"
+        except RuntimeError as error:
+            said = str(error)
+        test.check(f"#size={size} is not possible" in said and "pixels" in said, f"size {size}: {said}")
+    show(browser, test.path("amphora.html"), "size=80x60")
+    browser.ask("location.hash = 'size=0x0'")
+    browser.until("document.getElementById('message').className === 'failed'")
+    browser.ask("location.hash = 'size=60x80'")
+    browser.until("document.getElementById('message').textContent === ''")
+    drawn(browser)
+    test.check(browser.ask("viewer.canvas.width") == 60, "an address that is put right draws again")
     policy = browser.ask("document.querySelector('meta[http-equiv=Content-Security-Policy]').content")
     test.check("default-src 'none'" in policy, "a page asks for nothing outside of itself")
     test.check(not [f for f in browser.faults if "Content Security Policy" in str(f)], str(browser.faults))
