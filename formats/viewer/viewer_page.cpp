@@ -331,6 +331,15 @@ PageReport reportOf(const PageWriter& writer, std::size_t views, std::int64_t po
     return {views, points, frames, writer.imageBytes(), writer.bytes()};
 }
 
+/// As of views, which have the note's words.
+void noteMaterialLeftOut(const AtlasPage& page, Job& job) {
+    Bundle like;
+    ReferenceView& view = like.views.emplace_back();
+    if (!page.metallicRoughness.empty()) view.metallicRoughness = Image<glm::vec2>(1, 1);
+    if (!page.emissive.empty()) view.emissive = Image<glm::vec3>(1, 1);
+    like.noteMaterialLeftOut(job);
+}
+
 void noteSize(const PageReport& report, Job& job) {
     if (report.bytes > kHard)
         job.note(fmt::format(
@@ -410,6 +419,7 @@ Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::pa
         return writeViewerPage(*still, path, options, job);
     }
     STX_TRY(auto writer, startPage(path, options, atlas.title, false));
+    noteMaterialLeftOut(atlas.pages[0], job);
     noteEnvironmentLeftOut(atlas.environment, job);
     STX_TRY(const PageSet set, PageSet::of(atlas, job));
     PagePoints points;

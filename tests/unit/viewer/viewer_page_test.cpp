@@ -475,6 +475,23 @@ TEST(ViewerPage, SaysThatItLeavesTheEnvironmentOut) {
     EXPECT_NE(notes[0].find("environment"), std::string::npos) << notes[0];
 }
 
+TEST(ViewerPage, SaysThatItLeavesMaterialsOut) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle bundle = smallBundle(2, 16, false, false);
+    for (ReferenceView& view : bundle.views)
+        view.emissive = Image<glm::vec3>(view.camera.width, view.camera.height, glm::vec3(0));
+    const auto atlas = pack(bundle, {}, job);
+    ASSERT_TRUE(atlas);
+    (void)job.takeNotes();
+    ASSERT_TRUE(write(std::move(bundle), folder.path() / "a.html", job));
+    const auto ofViews = job.takeNotes();
+    ASSERT_EQ(ofViews.size(), 1u);
+    EXPECT_NE(ofViews[0].find("emissive"), std::string::npos) << ofViews[0];
+    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "b.html", {"atlas", {}, {}, {}}, job));
+    EXPECT_EQ(job.takeNotes(), ofViews);
+}
+
 /// A wall that two views see, who lack the depth of a part of it.
 Bundle wallWithoutSomeDepth() {
     Bundle bundle = smallBundle(2, 16, false, false);
