@@ -111,7 +111,8 @@ class Viewer {
     orbit(right, down) {
         const c = this.camera, up = unit(c.up), {eye, target, turn} = this.data.start, pivot = turn ? target : c.target;
         let arm = turned(minus(c.eye, pivot), up, -right);
-        const side = unit(cross(up, arm)), angle = Math.acos(Math.max(-1, Math.min(1, dot(unit(arm), up))));
+        const across = cross(up, arm), side = lengthOf(across) > 1e-9 * lengthOf(arm) ? unit(across) : lookAt(c, 1, 1).axes[0];
+        const angle = Math.acos(Math.max(-1, Math.min(1, dot(unit(arm), up))));
         arm = turned(arm, side, Math.max(0.01, Math.min(Math.PI - 0.01, angle - down)) - angle);
         c.eye = plus(pivot, turn ? armWithin(arm, minus(eye, target), turn) : arm);
     }

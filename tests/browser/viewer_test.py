@@ -100,6 +100,7 @@ def models(test, browser, args):
     test.stx_run("extract", "amphora.mp4", "-o", "parts.html", "--max-memory", "16")
     test.compare(browser, "amphora, with memory for a third of its views", "parts.html", "amphora.mp4", "1.5,1.2,2.5", "0,0.5,0")
     test.compare(browser, "amphora, from afar", "amphora.html", "amphora.mp4", "4,3,9", "0,0.5,0")
+    test.compare(browser, "amphora, from above", "amphora.html", "amphora.mp4", "0,3,0", "0,0.5,0")
     test.compare(browser, "amphora, near", "amphora.html", "amphora.mp4", "0.9,1.1,1.1", "0.1,0.7,0")
 
 
@@ -133,6 +134,9 @@ def bounds_of(test, name):
 
 def touched(test, browser):
     """Mouse, wheel, keys, touch, the command and the address."""
+    show(browser, test.path("amphora.html"), "eye=0,3,0&target=0,0.5,0")
+    browser.drag((400, 150), (400, 120))
+    test.check(browser.ask("lengthOf(cross(viewer.camera.eye, [0, 1, 0]))") > 0.1, "a drag leads away from straight above")
     show(browser, test.path("amphora.html"), "eye=1.5,1.2,2.5&target=0,0.5,0&fov=40")
     camera = lambda: browser.ask("JSON.stringify(viewer.camera)")
     for name, act in [
