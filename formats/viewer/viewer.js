@@ -199,7 +199,13 @@ class Viewer {
 
     // ---- Address and command ----
 
-    world(v) { return plus(v, this.data.origin).map((x) => String(Number(x.toPrecision(9)))).join(","); }
+    // A point of the camera's with as many decimals as its distance from what it looks at asks for, wherever
+    // the origin is: a hundred millionth of that.
+    world(v) {
+        const arm = lengthOf(minus(this.camera.eye, this.camera.target));
+        const decimals = Math.max(0, Math.min(100, 8 - Math.floor(Math.log10(arm))));
+        return plus(v, this.data.origin).map((x) => String(Number(x.toFixed(decimals)))).join(",");
+    }
     plain(v) { return v.map((x) => String(Number(x.toPrecision(7)))).join(","); }
 
     writeAddress() {

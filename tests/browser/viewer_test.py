@@ -170,6 +170,17 @@ def touched(test, browser):
     test.check(found >= LEAST, f"the command's picture: {found:.1f} dB")
 
 
+def far_from_the_origin(test, browser):
+    """Coordinates of surveyors leave the address and the command as exact as others."""
+    show(browser, test.path("amphora.html"), "")
+    off = browser.ask("""(() => {
+        viewer.data.origin = [500000, 5300000, 300];
+        Object.assign(viewer.camera, {eye: [0.0123456789, 0.0345678912, 0.3], target: [0, 0, 0]});
+        return lengthOf(minus(minus(viewer.world(viewer.camera.eye).split(",").map(Number), viewer.data.origin), viewer.camera.eye));
+    })()""")
+    test.check(off < 1e-8, f"far from the origin the address is off by {off}")
+
+
 def single(test, browser):
     """The page of one view begins at its pose, and nothing takes the eye far from it or to where the view shows nothing."""
     test.stx_run("convert", test.model, "-o", "one.mp4", "--views", "ring:1", "--size", "128x128")
@@ -306,6 +317,7 @@ def main():
             browser.size(640, 400)
             models(test, browser, args)
             touched(test, browser)
+            far_from_the_origin(test, browser)
             single(test, browser)
             photo(test, browser)
             captured(test, browser, args)
