@@ -1,6 +1,7 @@
 // The merged textures of one moment on the device, and what is known of their points before any camera is.
 
 const kBlock = 16, kTableRows = 1024, kEntry = 8;
+const kMostReach = 6;  // pixels that a point covers to each side in another view
 
 // A texture of numbers that shaders read with texelFetch.
 function makeTexture(gl, target, internal, format, type, width, height, layers, data) {
@@ -90,7 +91,7 @@ class Scene {
         scene.upload(pages);
         scene.prepare(prepare, pages, data.padding);
         scene.findBlocks(pages);
-        scene.makeCover(pages, data.partial);
+        scene.makeCover(pages, data.padding, data.partial);
         return scene;
     }
 
@@ -209,40 +210,46 @@ class Scene {
     }
 
     // What each view saw of the object's outline: a layer of alpha for each.
-    makeCover(pages, partial) {
+    makeCover(pages, padding, partial) {
         const gl = this.gl, views = this.views;
         const width = Math.max(...views.map((v) => v.width)), height = Math.max(...views.map((v) => v.height));
         const most = Math.min(gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS), Math.floor(256e6 / (width * height)));
         // Where nothing is known there is no background either.
         const covers = views.slice(0, most).map((v) =>
             new Uint8Array(width * height).fill(v.noDepth === "unknown" ? 255 : 0));
-        const eachTexel = (visit) => this.rectangles.forEach((r) => {
-            for (let j = 0; j < r.height; ++j) {
-                for (let i = 0; i < r.width; ++i) {
+        const eachTexel = (visit, padding) => this.rectangles.forEach((r) => {
+            const view = views[r.view];
+            for (let j = -padding; j < r.height + padding; ++j) {
+                for (let i = -padding; i < r.width + padding; ++i) {
                     const x = r.viewX + (r.turned ? j : i), y = r.viewY + (r.turned ? r.width - 1 - i : j);
-                    visit(r, x, y, (r.y + j) * this.width + r.x + i);
+                    if (x >= 0 && y >= 0 && x < view.width && y < view.height) visit(r, x, y, (r.y + j) * this.width + r.x + i);
                 }
             }
         });
+        // Beside a rectangle its padding shows the view.
+        const known = covers.map((cover) => new Uint8Array(partial ? cover.length : 0));
         eachTexel((r, x, y, texel) => {
-            if (r.view < covers.length) covers[r.view][y * width + x] = pages[r.page].colour.values[4 * texel + 3];
-        });
-        // Pixels that were left out because other views show them are no background.
+            if (r.view >= covers.length) return;
+            covers[r.view][y * width + x] = pages[r.page].colour.values[4 * texel + 3];
+            if (partial) known[r.view][y * width + x] = 1;
+        }, Math.min(padding, 2));
+        // Pixels that were left out because other views show them are no background: outsideBits() of lib/packing.
         if (partial) {
             eachTexel((r, x, y, texel) => {
                 const code = pages[r.page].depth.values[texel], from = views[r.view];
                 if (code === 0) return;
                 const dist = from.nearPlane + (1 - (code - 1) / (from.dmax - 1)) * (from.farPlane - from.nearPlane);
-                const point = pointAt(from, x + 0.5, y + 0.5, dist);
+                const point = pointAt(from, x + 0.5, y + 0.5, dist), spacing = (from.orthographic ? 1 : dist) / from.fx;
                 covers.forEach((cover, n) => {
                     const v = views[n], q = into(v, minus(point, v.position)), k = v.orthographic ? 1 : -1 / q[2];
-                    if (n === r.view || !(q[2] < 0)) return;
+                    if (n === r.view || !(v.orthographic || q[2] < 0)) return;
                     const px = Math.floor(v.cx + v.fx * q[0] * k), py = Math.floor(v.cy - v.fy * q[1] * k);
-                    for (let b = Math.max(0, py - 1); b <= Math.min(v.height - 1, py + 1); ++b)
-                        for (let a = Math.max(0, px - 1); a <= Math.min(v.width - 1, px + 1); ++a)
-                            if (cover[b * width + a] === 0) cover[b * width + a] = 255;
+                    const reach = 1 + Math.floor(Math.min(spacing * v.fx * k, kMostReach - 1));
+                    for (let b = Math.max(0, py - reach); b <= Math.min(v.height - 1, py + reach); ++b)
+                        for (let a = Math.max(0, px - reach); a <= Math.min(v.width - 1, px + reach); ++a)
+                            if (known[n][b * width + a] === 0) cover[b * width + a] = 255;
                 });
-            });
+            }, 0);
         }
         const used = covers.map((cover, n) => n).filter((n) => {
             const v = views[n];

@@ -93,6 +93,7 @@ def models(test, browser, args):
     test.stx_run("pack", "amphora.mp4", "-o", "atlas", "--prune", "--layout", "tight")
     test.stx_run("extract", "atlas", "-o", "atlas.html")
     test.compare(browser, "amphora, pruned, as an atlas", "atlas.html", "atlas", "-1.5,1.4,2.2", "0,0.5,0")
+    pruned_boxes(test, browser)
     test.stx_run("extract", "amphora.mp4", "-o", "jpeg.html", "--colour", "jpeg")
     test.compare(browser, "amphora, with JPEG", "jpeg.html", "amphora.mp4", "1.5,1.2,2.5", "0,0.5,0")
     copied_pictures(test, browser)
@@ -102,6 +103,22 @@ def models(test, browser, args):
     test.compare(browser, "amphora, from afar", "amphora.html", "amphora.mp4", "4,3,9", "0,0.5,0")
     test.compare(browser, "amphora, from above", "amphora.html", "amphora.mp4", "0,3,0", "0,0.5,0")
     test.compare(browser, "amphora, near", "amphora.html", "amphora.mp4", "0.9,1.1,1.1", "0.1,0.7,0")
+
+
+def pruned_boxes(test, browser):
+    """Straight outlines of a pruned atlas: what its views show beside its rectangles counts."""
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    faces = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
+    with open(test.path("boxes.obj"), "w", encoding="ascii") as file:
+        for n, (at, size) in enumerate((((-0.5, -0.5, -0.5), (1, 1, 1)), ((0.8, -0.3, -0.2), (0.4, 1.4, 0.3)))):
+            for corner in corners:
+                file.write("v " + " ".join(str(a + s * c) for a, s, c in zip(at, size, corner)) + "\n")
+            for face in faces:
+                file.write("f " + " ".join(str(8 * n + k) for k in face) + "\n")
+    test.stx_run("convert", "boxes.obj", "-o", "boxes.exr", "--views", "sphere:12", "--size", "128x128")
+    test.stx_run("pack", "boxes.exr", "-o", "boxes", "--prune", "--layout", "tight")
+    test.stx_run("extract", "boxes", "-o", "boxes.html")
+    test.compare(browser, "boxes, pruned, as an atlas", "boxes.html", "boxes", "2,1.5,4", "0.2,0.1,0")
 
 
 def copied_pictures(test, browser):
