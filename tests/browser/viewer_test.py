@@ -57,14 +57,14 @@ class Test:
     def path(self, name):
         return os.path.join(self.folder, name)
 
-    def compare(self, browser, name, page, source, eye, target, light=False):
+    def compare(self, browser, name, page, source, eye, target, light=False, fov=40):
         """A picture of the page against stx's own."""
         width, height = SIZE.split("x")
-        fragment = f"eye={eye}&target={target}&fov=40&size={SIZE}&ui=off&background=%23000000"
+        fragment = f"eye={eye}&target={target}&fov={fov}&size={SIZE}&ui=off&background=%23000000"
         words = ["--light=dir:-1,-1,-0.5", "--ambient", "0.25"] if light else []
         show(browser, self.path(page), fragment + ("&light=-1,-1,-0.5&ambient=0.25" if light else ""))
         browser.picture(self.path("shot.png"), int(width), int(height))
-        self.stx_run("render", source, "-o", "wanted.png", "--mode", "splat", f"--eye={eye}", f"--target={target}", "--fov", "40",
+        self.stx_run("render", source, "-o", "wanted.png", "--mode", "splat", f"--eye={eye}", f"--target={target}", "--fov", str(fov),
                      "--size", SIZE, "--background", "black", "--backend", "cpu", *words)
         found = psnr(self.stx, "shot.png", "wanted.png", self.folder)
         self.check(found >= LEAST, f"{name}: {found:.1f} dB")
@@ -93,7 +93,7 @@ def models(test, browser, args):
     test.stx_run("pack", "amphora.mp4", "-o", "atlas", "--prune", "--layout", "tight")
     test.stx_run("extract", "atlas", "-o", "atlas.html")
     test.compare(browser, "amphora, pruned, as an atlas", "atlas.html", "atlas", "-1.5,1.4,2.2", "0,0.5,0")
-    pruned_boxes(test, browser)
+    boxes(test, browser)
     test.stx_run("extract", "amphora.mp4", "-o", "jpeg.html", "--colour", "jpeg")
     test.compare(browser, "amphora, with JPEG", "jpeg.html", "amphora.mp4", "1.5,1.2,2.5", "0,0.5,0")
     copied_pictures(test, browser)
@@ -105,8 +105,9 @@ def models(test, browser, args):
     test.compare(browser, "amphora, near", "amphora.html", "amphora.mp4", "0.9,1.1,1.1", "0.1,0.7,0")
 
 
-def pruned_boxes(test, browser):
-    """Straight outlines of a pruned atlas: what its views show beside its rectangles counts."""
+def boxes(test, browser):
+    """Straight outlines of a pruned atlas: what its views show beside its rectangles counts. Splats that are larger than the
+    picture end where stx ends them."""
     corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
     faces = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
     with open(test.path("boxes.obj"), "w", encoding="ascii") as file:
@@ -119,6 +120,8 @@ def pruned_boxes(test, browser):
     test.stx_run("pack", "boxes.exr", "-o", "boxes", "--prune", "--layout", "tight")
     test.stx_run("extract", "boxes", "-o", "boxes.html")
     test.compare(browser, "boxes, pruned, as an atlas", "boxes.html", "boxes", "2,1.5,4", "0.2,0.1,0")
+    test.stx_run("extract", "boxes.exr", "-o", "near.html")
+    test.compare(browser, "boxes, near and seen along a side", "near.html", "boxes.exr", "0.6,0.2,0.4", "0.8,0,-5", fov=100)
 
 
 def copied_pictures(test, browser):

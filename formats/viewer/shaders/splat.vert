@@ -12,6 +12,7 @@ layout(location = 0) in uvec3 block;  // u0 | v0 << 16, columns | rows << 16, re
 flat out vec3 centre;  // pixel, distance
 flat out vec3 inverse;
 flat out vec4 shape;   // small, core2, slope
+flat out vec2 boxReach;  // pixels from the centre to the sides of what is drawn
 #if PASS == 2
 flat out vec4 colour;
 flat out vec3 across, down, normal;
@@ -74,6 +75,7 @@ void main() {
     }
     centre = vec3(p.pixel, p.dist);
     inverse = splat.q;
+    boxReach = splat.reach;
     shape = vec4(splat.small ? 1.0 : 0.0, splat.core2, splat.slope);
 #if PASS == 2
     colour = rgba;
