@@ -68,6 +68,7 @@ class Painter {
             kSamplers[gl[name]] = "sampler";
         const make = (vertex, fragment, pass) => new Program(gl, vertex, fragment, pass);
         this.prepare = make("screen.vert", "prepare.frag", 0);
+        this.smooth = make("screen.vert", "smooth.frag", 0);
         this.front = make("splat.vert", "splat.frag", 1);
         this.blend = make("splat.vert", "splat.frag", 2);
         this.resolve = make("screen.vert", "resolve.frag", 0);
@@ -83,7 +84,7 @@ class Painter {
         gl.bindVertexArray(this.blockArray);
         gl.bindBuffer(gl.ARRAY_BUFFER, this.blockList);
         gl.enableVertexAttribArray(0);
-        gl.vertexAttribIPointer(0, 3, gl.UNSIGNED_INT, 12, 0);
+        gl.vertexAttribIPointer(0, 4, gl.UNSIGNED_INT, 16, 0);
         gl.vertexAttribDivisor(0, 1);
         this.noArray = gl.createVertexArray();
         gl.bindVertexArray(this.noArray);
@@ -126,7 +127,7 @@ class Painter {
     blocksInSight(scene, maps, camera) {
         const list = [];
         let farthest = 1e-30;
-        for (const b of scene.blocks) {
+        for (const [number, b] of scene.blocks.entries()) {
             const m = maps[b.rectangle];
             let left = Infinity, right = -Infinity, top = Infinity, bottom = -Infinity, near = Infinity, far = -Infinity;
             for (let corner = 0; corner < 8; ++corner) {
@@ -144,7 +145,7 @@ class Painter {
             const room = 4 + 3 * Math.max(right - left, bottom - top) / kBlock;
             if (near > 1e-6 * far && (right < -room || bottom < -room || left > camera.width + room || top > camera.height + room)) continue;
             farthest = Math.max(farthest, far);
-            list.push(b.u0 | b.v0 << 16, (b.u1 - b.u0) | (b.v1 - b.v0) << 16, b.rectangle);
+            list.push(b.u0 | b.v0 << 16, (b.u1 - b.u0) | (b.v1 - b.v0) << 16, b.rectangle, number);
         }
         return {list: new Uint32Array(list), farthest: farthest * 2};
     }
@@ -212,14 +213,14 @@ class Painter {
         const table = this.rectangleTable(scene, maps, camera), views = this.viewTable(scene, camera);
         const lens = [1 / camera.fx, 1 / camera.fy, camera.cx - 0.5, camera.cy - 0.5];
         const points = {colourTexture: [scene.colour, array], depthTexture: [scene.depth, array], slopeTexture: [scene.slope, array],
-                        normalTexture: [scene.normal, array], rectangleTable: [table, two], lens,
+                        normalTexture: [scene.normal, array], smoothTexture: [scene.smooth, two], rectangleTable: [table, two], lens,
                         frameSize: [camera.width, camera.height], splatSize: look.splatSize, mostReach: this.mostReach,
                         farthest: sight.farthest};
         gl.viewport(0, 0, camera.width, camera.height);
         gl.bindVertexArray(this.blockArray);
         gl.bindBuffer(gl.ARRAY_BUFFER, this.blockList);
         gl.bufferData(gl.ARRAY_BUFFER, sight.list, gl.STREAM_DRAW);
-        const instances = sight.list.length / 3;
+        const instances = sight.list.length / 4;
 
         gl.bindFramebuffer(gl.FRAMEBUFFER, this.frames[0]);
         gl.enable(gl.DEPTH_TEST);

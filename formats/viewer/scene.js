@@ -1,6 +1,8 @@
 // The merged textures of one moment on the device, and what is known of their points before any camera is.
 
 const kBlock = 16, kTableRows = 1024, kEntry = 8;
+const kBlockColumns = 1024;  // of the texture of blocks
+const kSmoothDepths = 1.2;  // lib/render/splat/plan.cpp
 const kMostReach = 6;  // pixels that a point covers to each side in another view
 
 // A texture of numbers that shaders read with texelFetch.
@@ -60,7 +62,7 @@ function withAlpha(image) {
 class Scene {
     // `data` is what stx wrote: views, rectangles, and the number of each page's images; `image(number)`
     // gives a decoded one.
-    static async load(gl, prepare, data, image) {
+    static async load(gl, programs, data, image) {
         const scene = new Scene();
         scene.gl = gl;
         scene.pruned = data.pruned;
@@ -89,8 +91,9 @@ class Scene {
         for (const page of pages)
             for (const name of Object.keys(page)) page[name] = withRoom(page[name], width, height);
         scene.upload(pages);
-        scene.prepare(prepare, pages, data.padding);
+        scene.prepare(programs.prepare, pages, data.padding);
         scene.findBlocks(pages);
+        scene.findSmooth(programs.smooth);
         scene.makeCover(pages, data.padding, data.partial);
         return scene;
     }
@@ -209,6 +212,25 @@ class Scene {
         });
     }
 
+    // Which blocks are smooth, a texel for each.
+    findSmooth(program) {
+        const gl = this.gl, two = gl.TEXTURE_2D, array = gl.TEXTURE_2D_ARRAY, rows = Math.max(1, Math.ceil(this.blocks.length / kBlockColumns));
+        const data = new Float32Array(4 * kBlockColumns * rows);
+        this.blocks.forEach((b, n) => {
+            const r = this.rectangles[b.rectangle];
+            data.set([r.x + b.u0, r.y + b.v0, b.u1 - b.u0 + 32 * (b.v1 - b.v0), 2 * r.page + (b.far < kSmoothDepths * b.near ? 1 : 0)], 4 * n);
+        });
+        const table = makeTexture(gl, two, gl.RGBA32F, gl.RGBA, gl.FLOAT, kBlockColumns, rows, 1, data), frame = gl.createFramebuffer();
+        this.smooth = makeTexture(gl, two, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, kBlockColumns, rows, 1);
+        gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+        gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, two, this.smooth, 0);
+        gl.viewport(0, 0, kBlockColumns, rows);
+        program.use({blockTable: [table, two], colourTexture: [this.colour, array], depthTexture: [this.depth, array], slopeTexture: [this.slope, array]});
+        gl.drawArrays(gl.TRIANGLES, 0, 3);
+        gl.deleteFramebuffer(frame);
+        gl.deleteTexture(table);
+    }
+
     // What each view saw of the object's outline: a layer of alpha for each.
     makeCover(pages, padding, partial) {
         const gl = this.gl, views = this.views;
@@ -282,6 +304,6 @@ class Scene {
     }
 
     release() {
-        for (const t of [this.colour, this.depth, this.slope, this.normal, this.cover]) this.gl.deleteTexture(t);
+        for (const t of [this.colour, this.depth, this.slope, this.normal, this.smooth, this.cover]) this.gl.deleteTexture(t);
     }
 }

@@ -48,7 +48,7 @@ class Viewer {
         }
         const image = (k) => decodeImage(bytesOf("image" + k));
         const loading = inflated(bytesOf("scene" + number)).json()
-            .then((data) => Scene.load(this.painter.gl, this.painter.prepare, data, image));
+            .then((data) => Scene.load(this.painter.gl, this.painter, data, image));
         this.scenes.set(number, loading);
         const scene = await loading;
         // About 20 bytes a pixel: half a gigabyte of moments.
