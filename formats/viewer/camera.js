@@ -38,7 +38,8 @@ function armWithin(arm, home, most) {
 function lookAt({eye, target, up, fov}, width, height) {
     const back = unit(minus(eye, target));
     let right = cross(up, back);
-    if (lengthOf(right) < 1e-9) right = cross(Math.abs(back[1]) < 0.9 ? [0, 1, 0] : [1, 0, 0], back);
+    // Along `up`: as lookAt() of lib/geometry/camera.cpp.
+    if (!(lengthOf(right) > 1e-9 * lengthOf(up))) right = cross(Math.abs(back[1]) > 0.9 ? [0, 0, -back[1]] : [0, 1, 0], back);
     right = unit(right);
     const f = 0.5 * height / Math.tan(fov * Math.PI / 360);
     return {position: eye, axes: [right, cross(back, right), back], orthographic: false, width, height,

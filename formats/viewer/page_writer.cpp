@@ -46,6 +46,7 @@ std::string packedProgram() {
     Json texts;
     for (const auto& [name, text] : {std::pair{"screen.vert", viewer::screen_vert},
                                      {"prepare.frag", viewer::prepare_frag},
+                                     {"smooth.frag", viewer::smooth_frag},
                                      {"splat.vert", viewer::splat_vert},
                                      {"splat.frag", viewer::splat_frag},
                                      {"resolve.frag", viewer::resolve_frag},

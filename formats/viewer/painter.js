@@ -68,6 +68,7 @@ class Painter {
             kSamplers[gl[name]] = "sampler";
         const make = (vertex, fragment, pass) => new Program(gl, vertex, fragment, pass);
         this.prepare = make("screen.vert", "prepare.frag", 0);
+        this.smooth = make("screen.vert", "smooth.frag", 0);
         this.front = make("splat.vert", "splat.frag", 1);
         this.blend = make("splat.vert", "splat.frag", 2);
         this.resolve = make("screen.vert", "resolve.frag", 0);
@@ -76,13 +77,14 @@ class Painter {
         this.outline = make("outline.vert", "outline.frag", 0);
         this.silhouettes = make("screen.vert", "silhouettes.frag", 0);
         this.present = make("screen.vert", "present.frag", 0);
+        this.mostSide = gl.getParameter(gl.MAX_TEXTURE_SIZE);
         this.mostReach = gl.getParameter(gl.ALIASED_POINT_SIZE_RANGE)[1] / 2;
         this.blockList = gl.createBuffer();
         this.blockArray = gl.createVertexArray();
         gl.bindVertexArray(this.blockArray);
         gl.bindBuffer(gl.ARRAY_BUFFER, this.blockList);
         gl.enableVertexAttribArray(0);
-        gl.vertexAttribIPointer(0, 3, gl.UNSIGNED_INT, 12, 0);
+        gl.vertexAttribIPointer(0, 4, gl.UNSIGNED_INT, 16, 0);
         gl.vertexAttribDivisor(0, 1);
         this.noArray = gl.createVertexArray();
         gl.bindVertexArray(this.noArray);
@@ -118,14 +120,14 @@ class Painter {
         this.frames = [frontFrame, frameOf(colour, normal), frameOf(pictures[0]), frameOf(pictures[1]),
                        frameOf(colour), frameOf(normal)];
         if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE)
-            throw new Error("this device cannot draw into textures of floats");
+            throw new Error(`this device cannot draw into textures of floats of ${width}x${height} pixels`);
     }
 
     // Blocks that may be in sight, and the farthest distance of any.
     blocksInSight(scene, maps, camera) {
         const list = [];
         let farthest = 1e-30;
-        for (const b of scene.blocks) {
+        for (const [number, b] of scene.blocks.entries()) {
             const m = maps[b.rectangle];
             let left = Infinity, right = -Infinity, top = Infinity, bottom = -Infinity, near = Infinity, far = -Infinity;
             for (let corner = 0; corner < 8; ++corner) {
@@ -143,7 +145,7 @@ class Painter {
             const room = 4 + 3 * Math.max(right - left, bottom - top) / kBlock;
             if (near > 1e-6 * far && (right < -room || bottom < -room || left > camera.width + room || top > camera.height + room)) continue;
             farthest = Math.max(farthest, far);
-            list.push(b.u0 | b.v0 << 16, (b.u1 - b.u0) | (b.v1 - b.v0) << 16, b.rectangle);
+            list.push(b.u0 | b.v0 << 16, (b.u1 - b.u0) | (b.v1 - b.v0) << 16, b.rectangle, number);
         }
         return {list: new Uint32Array(list), farthest: farthest * 2};
     }
@@ -185,8 +187,7 @@ class Painter {
         const ratio = scene.samplesPerPixel(camera);
         if (!(ratio > 1.5)) return 1;
         let factor = Math.round(Math.min(ratio, 16));
-        const side = this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE);
-        while (factor > 1 && (camera.width * camera.height * factor * factor > 16e6 || Math.max(camera.width, camera.height) * factor > side)) --factor;
+        while (factor > 1 && (camera.width * camera.height * factor * factor > 16e6 || Math.max(camera.width, camera.height) * factor > this.mostSide)) --factor;
         return factor;
     }
 
@@ -212,14 +213,14 @@ class Painter {
         const table = this.rectangleTable(scene, maps, camera), views = this.viewTable(scene, camera);
         const lens = [1 / camera.fx, 1 / camera.fy, camera.cx - 0.5, camera.cy - 0.5];
         const points = {colourTexture: [scene.colour, array], depthTexture: [scene.depth, array], slopeTexture: [scene.slope, array],
-                        normalTexture: [scene.normal, array], rectangleTable: [table, two], lens,
+                        normalTexture: [scene.normal, array], smoothTexture: [scene.smooth, two], rectangleTable: [table, two], lens,
                         frameSize: [camera.width, camera.height], splatSize: look.splatSize, mostReach: this.mostReach,
                         farthest: sight.farthest};
         gl.viewport(0, 0, camera.width, camera.height);
         gl.bindVertexArray(this.blockArray);
         gl.bindBuffer(gl.ARRAY_BUFFER, this.blockList);
         gl.bufferData(gl.ARRAY_BUFFER, sight.list, gl.STREAM_DRAW);
-        const instances = sight.list.length / 3;
+        const instances = sight.list.length / 4;
 
         gl.bindFramebuffer(gl.FRAMEBUFFER, this.frames[0]);
         gl.enable(gl.DEPTH_TEST);

@@ -1,6 +1,9 @@
 // The merged textures of one moment on the device, and what is known of their points before any camera is.
 
 const kBlock = 16, kTableRows = 1024, kEntry = 8;
+const kBlockColumns = 1024;  // of the texture of blocks
+const kSmoothDepths = 1.2;  // lib/render/splat/plan.cpp
+const kMostReach = 6;  // pixels that a point covers to each side in another view
 
 // A texture of numbers that shaders read with texelFetch.
 function makeTexture(gl, target, internal, format, type, width, height, layers, data) {
@@ -59,7 +62,7 @@ function withAlpha(image) {
 class Scene {
     // `data` is what stx wrote: views, rectangles, and the number of each page's images; `image(number)`
     // gives a decoded one.
-    static async load(gl, prepare, data, image) {
+    static async load(gl, programs, data, image) {
         const scene = new Scene();
         scene.gl = gl;
         scene.pruned = data.pruned;
@@ -88,9 +91,10 @@ class Scene {
         for (const page of pages)
             for (const name of Object.keys(page)) page[name] = withRoom(page[name], width, height);
         scene.upload(pages);
-        scene.prepare(prepare, pages, data.padding);
+        scene.prepare(programs.prepare, pages, data.padding);
         scene.findBlocks(pages);
-        scene.makeCover(pages, data.partial);
+        scene.findSmooth(programs.smooth);
+        scene.makeCover(pages, data.padding, data.partial);
         return scene;
     }
 
@@ -208,41 +212,66 @@ class Scene {
         });
     }
 
+    // Which blocks are smooth, a texel for each.
+    findSmooth(program) {
+        const gl = this.gl, two = gl.TEXTURE_2D, array = gl.TEXTURE_2D_ARRAY, rows = Math.max(1, Math.ceil(this.blocks.length / kBlockColumns));
+        const data = new Float32Array(4 * kBlockColumns * rows);
+        this.blocks.forEach((b, n) => {
+            const r = this.rectangles[b.rectangle];
+            data.set([r.x + b.u0, r.y + b.v0, b.u1 - b.u0 + 32 * (b.v1 - b.v0), 2 * r.page + (b.far < kSmoothDepths * b.near ? 1 : 0)], 4 * n);
+        });
+        const table = makeTexture(gl, two, gl.RGBA32F, gl.RGBA, gl.FLOAT, kBlockColumns, rows, 1, data), frame = gl.createFramebuffer();
+        this.smooth = makeTexture(gl, two, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, kBlockColumns, rows, 1);
+        gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+        gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, two, this.smooth, 0);
+        gl.viewport(0, 0, kBlockColumns, rows);
+        program.use({blockTable: [table, two], colourTexture: [this.colour, array], depthTexture: [this.depth, array], slopeTexture: [this.slope, array]});
+        gl.drawArrays(gl.TRIANGLES, 0, 3);
+        gl.deleteFramebuffer(frame);
+        gl.deleteTexture(table);
+    }
+
     // What each view saw of the object's outline: a layer of alpha for each.
-    makeCover(pages, partial) {
+    makeCover(pages, padding, partial) {
         const gl = this.gl, views = this.views;
         const width = Math.max(...views.map((v) => v.width)), height = Math.max(...views.map((v) => v.height));
         const most = Math.min(gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS), Math.floor(256e6 / (width * height)));
         // Where nothing is known there is no background either.
         const covers = views.slice(0, most).map((v) =>
             new Uint8Array(width * height).fill(v.noDepth === "unknown" ? 255 : 0));
-        const eachTexel = (visit) => this.rectangles.forEach((r) => {
-            for (let j = 0; j < r.height; ++j) {
-                for (let i = 0; i < r.width; ++i) {
+        const eachTexel = (visit, padding) => this.rectangles.forEach((r) => {
+            const view = views[r.view];
+            for (let j = -padding; j < r.height + padding; ++j) {
+                for (let i = -padding; i < r.width + padding; ++i) {
                     const x = r.viewX + (r.turned ? j : i), y = r.viewY + (r.turned ? r.width - 1 - i : j);
-                    visit(r, x, y, (r.y + j) * this.width + r.x + i);
+                    if (x >= 0 && y >= 0 && x < view.width && y < view.height) visit(r, x, y, (r.y + j) * this.width + r.x + i);
                 }
             }
         });
+        // Beside a rectangle its padding shows the view.
+        const known = covers.map((cover) => new Uint8Array(partial ? cover.length : 0));
         eachTexel((r, x, y, texel) => {
-            if (r.view < covers.length) covers[r.view][y * width + x] = pages[r.page].colour.values[4 * texel + 3];
-        });
-        // Pixels that were left out because other views show them are no background.
+            if (r.view >= covers.length) return;
+            covers[r.view][y * width + x] = pages[r.page].colour.values[4 * texel + 3];
+            if (partial) known[r.view][y * width + x] = 1;
+        }, Math.min(padding, 2));
+        // Pixels that were left out because other views show them are no background: outsideBits() of lib/packing.
         if (partial) {
             eachTexel((r, x, y, texel) => {
                 const code = pages[r.page].depth.values[texel], from = views[r.view];
                 if (code === 0) return;
                 const dist = from.nearPlane + (1 - (code - 1) / (from.dmax - 1)) * (from.farPlane - from.nearPlane);
-                const point = pointAt(from, x + 0.5, y + 0.5, dist);
+                const point = pointAt(from, x + 0.5, y + 0.5, dist), spacing = (from.orthographic ? 1 : dist) / from.fx;
                 covers.forEach((cover, n) => {
                     const v = views[n], q = into(v, minus(point, v.position)), k = v.orthographic ? 1 : -1 / q[2];
-                    if (n === r.view || !(q[2] < 0)) return;
+                    if (n === r.view || !(v.orthographic || q[2] < 0)) return;
                     const px = Math.floor(v.cx + v.fx * q[0] * k), py = Math.floor(v.cy - v.fy * q[1] * k);
-                    for (let b = Math.max(0, py - 1); b <= Math.min(v.height - 1, py + 1); ++b)
-                        for (let a = Math.max(0, px - 1); a <= Math.min(v.width - 1, px + 1); ++a)
-                            if (cover[b * width + a] === 0) cover[b * width + a] = 255;
+                    const reach = 1 + Math.floor(Math.min(spacing * v.fx * k, kMostReach - 1));
+                    for (let b = Math.max(0, py - reach); b <= Math.min(v.height - 1, py + reach); ++b)
+                        for (let a = Math.max(0, px - reach); a <= Math.min(v.width - 1, px + reach); ++a)
+                            if (known[n][b * width + a] === 0) cover[b * width + a] = 255;
                 });
-            });
+            }, 0);
         }
         const used = covers.map((cover, n) => n).filter((n) => {
             const v = views[n];
@@ -275,6 +304,6 @@ class Scene {
     }
 
     release() {
-        for (const t of [this.colour, this.depth, this.slope, this.normal, this.cover]) this.gl.deleteTexture(t);
+        for (const t of [this.colour, this.depth, this.slope, this.normal, this.smooth, this.cover]) this.gl.deleteTexture(t);
     }
 }

@@ -35,6 +35,8 @@ class Viewer {
         message.className = failed ? "failed" : "";
     }
 
+    fail(error) { this.say("The page cannot be drawn: " + error.message, true); }
+
     // ---- Time ----
 
     async sceneOf(number) {
@@ -46,7 +48,7 @@ class Viewer {
         }
         const image = (k) => decodeImage(bytesOf("image" + k));
         const loading = inflated(bytesOf("scene" + number)).json()
-            .then((data) => Scene.load(this.painter.gl, this.painter.prepare, data, image));
+            .then((data) => Scene.load(this.painter.gl, this.painter, data, image));
         this.scenes.set(number, loading);
         const scene = await loading;
         // About 20 bytes a pixel: half a gigabyte of moments.
@@ -109,7 +111,8 @@ class Viewer {
     orbit(right, down) {
         const c = this.camera, up = unit(c.up), {eye, target, turn} = this.data.start, pivot = turn ? target : c.target;
         let arm = turned(minus(c.eye, pivot), up, -right);
-        const side = unit(cross(up, arm)), angle = Math.acos(Math.max(-1, Math.min(1, dot(unit(arm), up))));
+        const across = cross(up, arm), side = lengthOf(across) > 1e-9 * lengthOf(arm) ? unit(across) : lookAt(c, 1, 1).axes[0];
+        const angle = Math.acos(Math.max(-1, Math.min(1, dot(unit(arm), up))));
         arm = turned(arm, side, Math.max(0.01, Math.min(Math.PI - 0.01, angle - down)) - angle);
         c.eye = plus(pivot, turn ? armWithin(arm, minus(eye, target), turn) : arm);
     }
@@ -179,7 +182,11 @@ class Viewer {
         if (!this.waiting) {
             this.waiting = requestAnimationFrame(() => {
                 this.waiting = 0;
-                this.draw();
+                try {
+                    this.draw();
+                } catch (error) {
+                    this.fail(error);
+                }
             });
         }
         clearTimeout(this.rest);
@@ -192,7 +199,13 @@ class Viewer {
 
     // ---- Address and command ----
 
-    world(v) { return plus(v, this.data.origin).map((x) => String(Number(x.toPrecision(9)))).join(","); }
+    // A point of the camera's with as many decimals as its distance from what it looks at asks for, wherever
+    // the origin is: a hundred millionth of that.
+    world(v) {
+        const arm = lengthOf(minus(this.camera.eye, this.camera.target));
+        const decimals = Math.max(0, Math.min(100, 8 - Math.floor(Math.log10(arm))));
+        return plus(v, this.data.origin).map((x) => String(Number(x.toFixed(decimals)))).join(",");
+    }
     plain(v) { return v.map((x) => String(Number(x.toPrecision(7)))).join(","); }
 
     writeAddress() {
@@ -234,8 +247,10 @@ class Viewer {
         if (splat && splat[0] > 0) document.getElementById("splat-size").value = splat[0];
         if (light && lengthOf(light) > 0) this.setLight(light);
         for (const name of ["ambient", "specular"]) if (numbers(name, 1)) document.getElementById(name).value = numbers(name, 1)[0];
-        const size = (fields.get("size") || "").match(/^(\d{1,5})x(\d{1,5})$/);
+        const size = (fields.get("size") || "").match(/^(\d+)x(\d+)$/), most = this.painter.mostSide;
         this.size = size ? [Number(size[1]), Number(size[2])] : null;
+        if (size && !this.size.every((side) => side >= 1 && side <= most))
+            throw new Error(`#size=${size[0]} is not possible; on this device sides have 1 to ${most} pixels`);
         if (size) Object.assign(this.canvas.style, {width: size[1] + "px", height: size[2] + "px"});
         if (/^#[0-9a-f]{6}$/i.test(fields.get("background") || "")) this.background = fields.get("background");
         if (fields.get("ui") === "off") document.getElementById("panel").hidden = true;
@@ -260,6 +275,7 @@ class Viewer {
         words.push(`--fov ${Number(c.fov.toFixed(4))}`, `--size ${width}x${height}`,
                    `--background ${look.background.map((x) => Number(x.toFixed(4))).join(",")}`);
         if (this.data.frames.length > 1) words.push(`--time ${this.data.times[this.frame]}`);
+        if (this.data.without) words.push(`--without ${this.data.without}`);
         if (look.light.on)
             words.push(`--light=dir:${this.plain(look.light.direction)}`, `--ambient ${look.light.ambient}`,
                        `--specular ${look.light.specular}`, `--shininess ${look.light.shininess}`);
@@ -310,7 +326,13 @@ class Viewer {
         on("view", "change", () => this.fromView(document.getElementById("view").value));
         on("panel", "submit", (event) => event.preventDefault());
         window.addEventListener("hashchange", () => {
-            this.readAddress();
+            try {
+                this.readAddress();
+                if (document.getElementById("message").className === "failed") this.say("");
+            } catch (error) {
+                this.size = null;
+                this.fail(error);
+            }
             this.showFrame(this.frame);
         });
         window.addEventListener("resize", () => this.redraw());
@@ -402,8 +424,7 @@ document.body.insertAdjacentHTML("afterbegin", kPanel);
 document.querySelector("h1").textContent = document.title;
 const viewer = new Viewer();
 viewer.start().catch((error) => {
-    const old = error.message === "no WebGL 2";
-    viewer.say(old ? "This page needs WebGL 2, which this browser does not have or has switched off. Current versions of " +
-        "Firefox, Chrome, Edge and Safari have it; look whether hardware acceleration is on."
-        : "The page cannot be drawn: " + error.message, true);
+    if (error.message !== "no WebGL 2") return viewer.fail(error);
+    viewer.say("This page needs WebGL 2, which this browser does not have or has switched off. Current versions of " +
+        "Firefox, Chrome, Edge and Safari have it; look whether hardware acceleration is on.", true);
 });

@@ -8,6 +8,7 @@
 #include "formats/stx/stx.hpp"
 #include "formats/viewer/page_scene.hpp"
 #include "formats/viewer/page_writer.hpp"
+#include "formats/viewer/unmeasured_views.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/geometry/view_layout.hpp"
 #include "lib/model/depth_values.hpp"
@@ -29,6 +30,8 @@ constexpr double kSameSideCosine = 0.5;
 /// How far the eye goes to each side of a single view, as a share of the distance of what it turns
 /// around: as far as one photograph with depth bears.
 constexpr double kSingleReach = 0.08;
+/// The slot of what is behind all else: views have the first two.
+constexpr std::size_t kUnmeasuredSlot = 2;
 constexpr double kStartFovDeg = 40.0, kStartElevationDeg = 15.0;
 
 std::string titleOf(const PageOptions& options, const std::string& bundle) {
@@ -258,6 +261,48 @@ void look(const Bundle& views, PagePoints& points) {
     points.nearPlane = first.nearPlane;
 }
 
+/// What is drawn behind the views of a frame, made of them.
+struct Behind {
+    std::optional<int> scene;  ///< none where no pixel lacks its depth
+    bool leftOut = false;      ///< there was no memory for it
+};
+
+/// Writes what unmeasuredViews() gives as a scene, the last of its frame.
+Result<std::optional<int>> writeUnmeasured(PageWriter& writer, const Bundle& views,
+                                           const PageOptions& options, Job& job) {
+    Bundle layer = unmeasuredViews(views);
+    if (layer.views.empty()) return std::nullopt;
+    codeColours(layer, "the page", job);
+    STX_TRY(const Atlas atlas, packForPage(layer, job));
+    layer.views.clear();
+    PageScene scene({.jpegQuality = options.colours.jpegQuality});
+    Json pages = Json::array();
+    STX_TRY(auto images, scene.add(atlas, job));
+    STX_CHECK(writer.addImages(kUnmeasuredSlot, 0, std::move(images), pages));
+    STX_TRY(const int number,
+            writer.addScene(kUnmeasuredSlot, scene.description(std::move(pages))));
+    return number;
+}
+
+/// The same of a frame, whose table is read for it where there is memory.
+Result<Behind> writeBehind(PageWriter& writer, std::unique_ptr<ViewTable>& table,
+                           const PageOptions& options, Job& job) {
+    const ViewTable& views = *table;
+    if (std::ranges::none_of(views.about().views, mayHaveUnmeasured)) return Behind();
+    if (memoryOfUnmeasured(views) > job.limits.maxMemoryBytes) {
+        job.note(
+            "colours without depth are not on the page, which stx render draws behind all else: "
+            "--max-memory has no room to find their places");
+        return Behind{std::nullopt, true};
+    }
+    if (!views.whole()) {
+        STX_TRY(auto bundle, wholeBundle(std::move(table), job));
+        table = tableOf(std::move(bundle));
+    }
+    STX_TRY(const auto scene, writeUnmeasured(writer, std::as_const(*table).about(), options, job));
+    return Behind{scene, false};
+}
+
 /// Writes one scene of a frame and gives its number. `points`, if any, is added to.
 Result<int> writeScene(PageWriter& writer, std::size_t slot, PageViews& views,
                        const PageOptions& options, PagePoints* points, Job& job) {
@@ -286,6 +331,15 @@ PageReport reportOf(const PageWriter& writer, std::size_t views, std::int64_t po
     return {views, points, frames, writer.imageBytes(), writer.bytes()};
 }
 
+/// As of views, which have the note's words.
+void noteMaterialLeftOut(const AtlasPage& page, Job& job) {
+    Bundle like;
+    ReferenceView& view = like.views.emplace_back();
+    if (!page.metallicRoughness.empty()) view.metallicRoughness = Image<glm::vec2>(1, 1);
+    if (!page.emissive.empty()) view.emissive = Image<glm::vec3>(1, 1);
+    like.noteMaterialLeftOut(job);
+}
+
 void noteSize(const PageReport& report, Job& job) {
     if (report.bytes > kHard)
         job.note(fmt::format(
@@ -310,6 +364,7 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
     Json scenes = Json::array(), data;
     PagePoints points;
     std::size_t count = 0;
+    bool leftOut = false;
     for (std::size_t i = 0; i < line.count(); ++i) {
         job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(line.count()),
                      "writing frames");
@@ -319,9 +374,12 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
             noteMaterialLeftOut(*table, job);
             noteEnvironmentLeftOut(std::as_const(*table).about().environment, job);
         }
+        if (!writer)
+            STX_SET(writer,
+                    startPage(path, options, std::as_const(*table).about().title, line.moves()));
+        STX_TRY(const Behind behind, writeBehind(*writer, table, options, job));
         STX_TRY(auto views, PageViews::of(std::move(table), line.moves(), job));
-        if (!writer) {
-            STX_TRY(writer, startPage(path, options, views.about().title, line.moves()));
+        if (i == 0) {
             count = views.about().views.size();
             points.boundsKnown = views.about().bounds.has_value();
             if (points.boundsKnown) points.bounds = *views.about().bounds;
@@ -332,11 +390,14 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
                     writeScene(*writer, slot, views, options, i == 0 ? &points : nullptr, job));
             numbers.push_back(number);
         }
+        if (behind.scene) numbers.push_back(*behind.scene);
+        leftOut = leftOut || behind.leftOut;
         scenes.push_back(std::move(numbers));
         if (i > 0) continue;
         STX_TRY(data, dataOf(views.about().views, points, views.about().origin, line, options));
     }
     data["frames"] = std::move(scenes);
+    if (leftOut) data["without"] = "unmeasured";
     STX_CHECK(writer->finish(data));
     const auto report = reportOf(*writer, count, points.count, line.count());
     noteSize(report, job);
@@ -358,6 +419,7 @@ Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::pa
         return writeViewerPage(*still, path, options, job);
     }
     STX_TRY(auto writer, startPage(path, options, atlas.title, false));
+    noteMaterialLeftOut(atlas.pages[0], job);
     noteEnvironmentLeftOut(atlas.environment, job);
     STX_TRY(const PageSet set, PageSet::of(atlas, job));
     PagePoints points;
@@ -370,6 +432,11 @@ Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::pa
     STX_CHECK(writer.addImages(0, 0, std::move(images), pages));
     STX_TRY(const int number, writer.addScene(0, scene.description(std::move(pages))));
     data["frames"] = {{number}};
+    if (std::ranges::any_of(atlas.views, mayHaveUnmeasured)) {
+        STX_TRY(const auto bundle, unpack(atlas, job));
+        STX_TRY(const auto behind, writeUnmeasured(writer, bundle, options, job));
+        if (behind) data["frames"][0].push_back(*behind);
+    }
     STX_CHECK(writer.finish(data));
     const auto report = reportOf(writer, atlas.views.size(), points.count, 1);
     noteSize(report, job);

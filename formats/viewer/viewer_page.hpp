@@ -40,14 +40,16 @@ void noteEnvironmentLeftOut(const std::shared_ptr<const Environment>& environmen
 /// frame are merged into at most four textures (pack(), tight), each a PNG: colour in 8 bits, with
 /// alpha where some is not full (or JPEG, as PageColours says), depth as DepthImage codes of 8 or
 /// 16 bits, normals in 8 bits, tilts and sizes of splats in 8 bits. Background views have textures
-/// of their own, and in films all views do: images that are the same as those of the frame before
-/// are written once. Where the memory limit has no room for all views of what stands still, they
-/// are merged in groups that it has room for: the page's bytes depend on the limit then, since one
-/// atlas of all views has to hold all at once, and many small ones take longer to draw. The page is
-/// UTF-16, takes 1.03 bytes for each of the images (pageText()) and about 30 kB.
+/// of their own, so has what no sensor measured (unmeasuredViews()), and in films all views do:
+/// images that are the same as those of the frame before are written once. Where the memory limit
+/// has no room for all views of what stands still, they are merged in groups that it has room for:
+/// the page's bytes depend on the limit then, since one atlas of all views has to hold all at once,
+/// and many small ones take longer to draw. The page is UTF-16, takes 1.03 bytes for each of the
+/// images (pageText()) and about 30 kB.
 ///
-/// Notes: colours of linear light become 8-bit sRGB, depth of 32 bits becomes 16; a page that
-/// browsers find hard to hold. Errors: those of the sequence and of pack(); files; cancelled.
+/// Notes: colours of linear light become 8-bit sRGB, depth of 32 bits becomes 16; what no sensor
+/// measured is left out for want of memory; a page that browsers find hard to hold. Errors: those
+/// of the sequence and of pack(); files; cancelled.
 [[nodiscard]] Result<PageReport> writeViewerPage(Sequence& frames,
                                                  const std::filesystem::path& path,
                                                  const PageOptions& options, Job& job);

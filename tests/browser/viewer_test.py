@@ -57,14 +57,14 @@ class Test:
     def path(self, name):
         return os.path.join(self.folder, name)
 
-    def compare(self, browser, name, page, source, eye, target, light=False):
+    def compare(self, browser, name, page, source, eye, target, light=False, fov=40):
         """A picture of the page against stx's own."""
         width, height = SIZE.split("x")
-        fragment = f"eye={eye}&target={target}&fov=40&size={SIZE}&ui=off&background=%23000000"
+        fragment = f"eye={eye}&target={target}&fov={fov}&size={SIZE}&ui=off&background=%23000000"
         words = ["--light=dir:-1,-1,-0.5", "--ambient", "0.25"] if light else []
         show(browser, self.path(page), fragment + ("&light=-1,-1,-0.5&ambient=0.25" if light else ""))
         browser.picture(self.path("shot.png"), int(width), int(height))
-        self.stx_run("render", source, "-o", "wanted.png", "--mode", "splat", f"--eye={eye}", f"--target={target}", "--fov", "40",
+        self.stx_run("render", source, "-o", "wanted.png", "--mode", "splat", f"--eye={eye}", f"--target={target}", "--fov", str(fov),
                      "--size", SIZE, "--background", "black", "--backend", "cpu", *words)
         found = psnr(self.stx, "shot.png", "wanted.png", self.folder)
         self.check(found >= LEAST, f"{name}: {found:.1f} dB")
@@ -93,6 +93,7 @@ def models(test, browser, args):
     test.stx_run("pack", "amphora.mp4", "-o", "atlas", "--prune", "--layout", "tight")
     test.stx_run("extract", "atlas", "-o", "atlas.html")
     test.compare(browser, "amphora, pruned, as an atlas", "atlas.html", "atlas", "-1.5,1.4,2.2", "0,0.5,0")
+    boxes(test, browser)
     test.stx_run("extract", "amphora.mp4", "-o", "jpeg.html", "--colour", "jpeg")
     test.compare(browser, "amphora, with JPEG", "jpeg.html", "amphora.mp4", "1.5,1.2,2.5", "0,0.5,0")
     copied_pictures(test, browser)
@@ -100,7 +101,28 @@ def models(test, browser, args):
     test.stx_run("extract", "amphora.mp4", "-o", "parts.html", "--max-memory", "16")
     test.compare(browser, "amphora, with memory for a third of its views", "parts.html", "amphora.mp4", "1.5,1.2,2.5", "0,0.5,0")
     test.compare(browser, "amphora, from afar", "amphora.html", "amphora.mp4", "4,3,9", "0,0.5,0")
+    test.compare(browser, "amphora, from above", "amphora.html", "amphora.mp4", "0,3,0", "0,0.5,0")
     test.compare(browser, "amphora, near", "amphora.html", "amphora.mp4", "0.9,1.1,1.1", "0.1,0.7,0")
+    test.compare(browser, "amphora, very near", "amphora.html", "amphora.mp4", "0.5,0.6,0.5", "-0.3,0.5,0.3", fov=80)
+
+
+def boxes(test, browser):
+    """Straight outlines of a pruned atlas: what its views show beside its rectangles counts. Splats that are larger than the
+    picture end where stx ends them."""
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    faces = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
+    with open(test.path("boxes.obj"), "w", encoding="ascii") as file:
+        for n, (at, size) in enumerate((((-0.5, -0.5, -0.5), (1, 1, 1)), ((0.8, -0.3, -0.2), (0.4, 1.4, 0.3)))):
+            for corner in corners:
+                file.write("v " + " ".join(str(a + s * c) for a, s, c in zip(at, size, corner)) + "\n")
+            for face in faces:
+                file.write("f " + " ".join(str(8 * n + k) for k in face) + "\n")
+    test.stx_run("convert", "boxes.obj", "-o", "boxes.exr", "--views", "sphere:12", "--size", "128x128")
+    test.stx_run("pack", "boxes.exr", "-o", "boxes", "--prune", "--layout", "tight")
+    test.stx_run("extract", "boxes", "-o", "boxes.html")
+    test.compare(browser, "boxes, pruned, as an atlas", "boxes.html", "boxes", "2,1.5,4", "0.2,0.1,0")
+    test.stx_run("extract", "boxes.exr", "-o", "near.html")
+    test.compare(browser, "boxes, near and seen along a side", "near.html", "boxes.exr", "0.6,0.2,0.4", "0.8,0,-5", fov=100)
 
 
 def copied_pictures(test, browser):
@@ -133,6 +155,9 @@ def bounds_of(test, name):
 
 def touched(test, browser):
     """Mouse, wheel, keys, touch, the command and the address."""
+    show(browser, test.path("amphora.html"), "eye=0,3,0&target=0,0.5,0")
+    browser.drag((400, 150), (400, 120))
+    test.check(browser.ask("lengthOf(cross(viewer.camera.eye, [0, 1, 0]))") > 0.1, "a drag leads away from straight above")
     show(browser, test.path("amphora.html"), "eye=1.5,1.2,2.5&target=0,0.5,0&fov=40")
     camera = lambda: browser.ask("JSON.stringify(viewer.camera)")
     for name, act in [
@@ -164,6 +189,17 @@ def touched(test, browser):
     test.stx_run(*words[1:], "--backend", "cpu")
     found = psnr(test.stx, "shot.png", "view.png", test.folder)
     test.check(found >= LEAST, f"the command's picture: {found:.1f} dB")
+
+
+def far_from_the_origin(test, browser):
+    """Coordinates of surveyors leave the address and the command as exact as others."""
+    show(browser, test.path("amphora.html"), "")
+    off = browser.ask("""(() => {
+        viewer.data.origin = [500000, 5300000, 300];
+        Object.assign(viewer.camera, {eye: [0.0123456789, 0.0345678912, 0.3], target: [0, 0, 0]});
+        return lengthOf(minus(minus(viewer.world(viewer.camera.eye).split(",").map(Number), viewer.data.origin), viewer.camera.eye));
+    })()""")
+    test.check(off < 1e-8, f"far from the origin the address is off by {off}")
 
 
 def single(test, browser):
@@ -212,11 +248,41 @@ def photo(test, browser):
         test.check(share <= most, f"from beside by {percent} %: {100 * share:.4f} % of the page is open")
 
 
+def captured(test, browser, args):
+    """What a depth camera has no depth of is drawn where stx draws it."""
+    kitchen = os.path.join(args.shared, "data/imagesets/7scenes-kitchen")
+    if not os.path.isdir(kitchen):
+        return
+    test.stx_run("convert", kitchen, "-o", "kitchen.exr")
+    test.stx_run("extract", "kitchen.exr", "-o", "kitchen.html")
+    show(browser, test.path("kitchen.html"), f"size={SIZE}&ui=off&background=%23000000")
+    browser.ask("viewer.fromView('0')")
+    drawn(browser)
+    browser.picture(test.path("shot.png"), *map(int, SIZE.split("x")))
+    test.stx_run(*shlex.split(browser.ask("viewer.command()"))[1:], "--backend", "cpu")
+    found = psnr(test.stx, "shot.png", "view.png", test.folder)
+    test.check(found >= LEAST, f"a kitchen of which some has no depth: {found:.1f} dB")
+
+
 def odd_addresses(test, browser):
     """What codes nothing is passed over; nothing that the page does is against its own policy."""
     for address in ("%", "eye=%E0%A4%A&fov=%", "eye=1,2&up=x&=&&"):
         show(browser, test.path("amphora.html"), address)
         test.check(browser.ask("viewer.camera.fov > 0"), f"a page draws at #{address}")
+    for size in ("0x0", "99999x99999", "1x100000"):
+        try:
+            show(browser, test.path("amphora.html"), f"size={size}")
+            said = "nothing"
+        except RuntimeError as error:
+            said = str(error)
+        test.check(f"#size={size} is not possible" in said and "pixels" in said, f"size {size}: {said}")
+    show(browser, test.path("amphora.html"), "size=80x60")
+    browser.ask("location.hash = 'size=0x0'")
+    browser.until("document.getElementById('message').className === 'failed'")
+    browser.ask("location.hash = 'size=60x80'")
+    browser.until("document.getElementById('message').textContent === ''")
+    drawn(browser)
+    test.check(browser.ask("viewer.canvas.width") == 60, "an address that is put right draws again")
     policy = browser.ask("document.querySelector('meta[http-equiv=Content-Security-Policy]').content")
     test.check("default-src 'none'" in policy, "a page asks for nothing outside of itself")
     test.check(not [f for f in browser.faults if "Content Security Policy" in str(f)], str(browser.faults))
@@ -272,8 +338,10 @@ def main():
             browser.size(640, 400)
             models(test, browser, args)
             touched(test, browser)
+            far_from_the_origin(test, browser)
             single(test, browser)
             photo(test, browser)
+            captured(test, browser, args)
             odd_addresses(test, browser)
             phone(test, browser)
             test.check(not browser.faults, f"no fault is logged: {browser.faults[:3]}")

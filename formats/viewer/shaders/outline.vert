@@ -2,7 +2,7 @@
 #include "formats/viewer/shaders/points.glsl"
 uniform vec2 frameSize;
 
-layout(location = 0) in uvec3 block;  // u0 | v0 << 16, columns | rows << 16, rectangle
+layout(location = 0) in uvec3 block;  // u0 | v0 << 16, columns | rows << 16, rectangle; a number is behind
 
 flat out vec2 centre;  // pixel
 

@@ -2,6 +2,7 @@
 #include "formats/viewer/shaders/scene.glsl"
 flat in vec3 centre, inverse;
 flat in vec4 shape;
+flat in vec2 boxReach;
 uniform float farthest;  // distances are depths of 0..1 by this
 #if PASS == 2
 flat in vec4 colour;
@@ -18,6 +19,8 @@ void main() {
     splat.small = shape.x != 0.0;
     splat.q = inverse;
     if (splat.small && any(greaterThanEqual(abs(d), vec2(1.0)))) discard;
+    // A point is a square, larger than the splat's box.
+    if (!splat.small && any(greaterThan(abs(d), boxReach))) discard;
     float q = squaredRadius(splat, d);
     float depth = depthAt(centre.z, shape.zw, d);
 #if PASS == 1

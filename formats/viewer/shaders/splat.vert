@@ -7,17 +7,21 @@ uniform vec2 frameSize;
 uniform float splatSize;  // 1 = what the data says
 uniform float mostReach;  // the largest point that the device draws, halved
 
-layout(location = 0) in uvec3 block;  // u0 | v0 << 16, columns | rows << 16, rectangle
+uniform sampler2D smoothTexture;  // a texel for each block
+
+layout(location = 0) in uvec4 block;  // u0 | v0 << 16, columns | rows << 16, rectangle, number
 
 flat out vec3 centre;  // pixel, distance
 flat out vec3 inverse;
 flat out vec4 shape;   // small, core2, slope
+flat out vec2 boxReach;  // pixels from the centre to the sides of what is drawn
 #if PASS == 2
 flat out vec4 colour;
 flat out vec3 across, down, normal;
 flat out vec2 weighing;  // quality, tolerance
 #endif
 
+const uint kBlockColumns = 1024u;  // of the texture of blocks
 // How far behind the front a point still belongs to it; see lib/render/splat/plan.cpp for these.
 const float kTolerance = 0.01, kToleranceRough = 0.02;
 const float kLeastQuality = 0.01;
@@ -47,7 +51,7 @@ void main() {
     gl_PointSize = 1.0;
     uint u, v;
     ivec3 texel;
-    if (!texelOf(block, u, v, texel)) return;
+    if (!texelOf(block.xyz, u, v, texel)) return;
     int rectangle = int(block.z);
     uint code = texelFetch(depthTexture, texel, 0).r;
     if (code == 0u) return;
@@ -74,10 +78,12 @@ void main() {
     }
     centre = vec3(p.pixel, p.dist);
     inverse = splat.q;
+    boxReach = splat.reach;
     shape = vec4(splat.small ? 1.0 : 0.0, splat.core2, splat.slope);
 #if PASS == 2
     colour = rgba;
-    weighing = vec2(splat.quality, (coded.x & 1) != 0 ? kTolerance : kToleranceRough);
+    bool smoothBlock = texelFetch(smoothTexture, ivec2(block.w % kBlockColumns, block.w / kBlockColumns), 0).r > 0.5;
+    weighing = vec2(splat.quality, smoothBlock ? kTolerance : kToleranceRough);
     colourGradient(texel, splat.steps, across, down);
     normal = texelFetch(normalTexture, texel, 0).xyz * 2.0 - 1.0;
 #endif

@@ -475,6 +475,79 @@ TEST(ViewerPage, SaysThatItLeavesTheEnvironmentOut) {
     EXPECT_NE(notes[0].find("environment"), std::string::npos) << notes[0];
 }
 
+TEST(ViewerPage, SaysThatItLeavesMaterialsOut) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle bundle = smallBundle(2, 16, false, false);
+    for (ReferenceView& view : bundle.views)
+        view.emissive = Image<glm::vec3>(view.camera.width, view.camera.height, glm::vec3(0));
+    const auto atlas = pack(bundle, {}, job);
+    ASSERT_TRUE(atlas);
+    (void)job.takeNotes();
+    ASSERT_TRUE(write(std::move(bundle), folder.path() / "a.html", job));
+    const auto ofViews = job.takeNotes();
+    ASSERT_EQ(ofViews.size(), 1u);
+    EXPECT_NE(ofViews[0].find("emissive"), std::string::npos) << ofViews[0];
+    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "b.html", {"atlas", {}, {}, {}}, job));
+    EXPECT_EQ(job.takeNotes(), ofViews);
+}
+
+/// A wall that two views see, who lack the depth of a part of it.
+Bundle wallWithoutSomeDepth() {
+    Bundle bundle = smallBundle(2, 16, false, false);
+    for (ReferenceView& view : bundle.views) {
+        view.noDepth = NoDepth::unknown;
+        const int width = view.camera.width, height = view.camera.height;
+        view.camera.orthographic = false;
+        view.texture = Rgba8Image(width, height, glm::u8vec4(90, 120, 150, 255));
+        view.depth =
+            Image<float>(width, height, static_cast<float>(0.5 * (view.nearPlane + view.farPlane)));
+        for (int y = 8; y < 15; ++y)
+            for (int x = 8; x < 15; ++x) view.depth.at(x, y) = kNoDepth;
+    }
+    return bundle;
+}
+
+TEST(ViewerPage, HoldsColoursWithoutDepthBehindAllElse) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle bundle = wallWithoutSomeDepth();
+    ASSERT_TRUE(write(bundle, folder.path() / "a.html", job));
+    const ReadPage page = readPage(folder.path() / "a.html");
+    ASSERT_EQ(page.json("data")["frames"][0].size(), 2u);
+    EXPECT_FALSE(page.json("data").contains("without"));
+    const int behind = page.json("data")["frames"][0][1];
+    const Json scene = page.json(fmt::format("scene{}", behind));
+    ASSERT_GE(scene["views"].size(), 2u);
+    for (const Json& view : scene["views"]) EXPECT_EQ(view["noDepth"], "unknown");
+    // An atlas of the same holds them, too.
+    const auto atlas = pack(bundle, {}, job);
+    ASSERT_TRUE(atlas);
+    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "b.html", {"atlas", {}, {}, {}}, job));
+    EXPECT_EQ(readPage(folder.path() / "b.html").json("data")["frames"][0].size(), 2u);
+    // Where nothing is there is nothing to hold.
+    for (ReferenceView& view : bundle.views) view.noDepth = NoDepth::empty;
+    ASSERT_TRUE(write(bundle, folder.path() / "c.html", job));
+    EXPECT_EQ(readPage(folder.path() / "c.html").json("data")["frames"][0].size(), 1u);
+}
+
+TEST(ViewerPage, SaysThatColoursWithoutDepthHaveNoRoom) {
+    const TemporaryFolder folder;
+    Job job;
+    OnDemand views(wallWithoutSomeDepth());
+    // The page needs 44 to 55 bytes for each of 963 pixels, with what is behind 60.
+    job.limits.maxMemoryBytes = 54'000;
+    const auto report =
+        writeViewerPage(views, folder.path() / "a.html", {"a.exr", {}, {}, {}}, job);
+    ASSERT_TRUE(report) << report.error().text();
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("colours without depth are not on the page"), std::string::npos);
+    const Json data = readPage(folder.path() / "a.html").json("data");
+    EXPECT_EQ(data["frames"][0].size(), 1u);
+    EXPECT_EQ(data["without"], "unmeasured") << "the command draws what the page shows";
+}
+
 TEST(ViewerPage, LeavesNothingWhenItFails) {
     const TemporaryFolder folder;
     Job job;
