@@ -216,6 +216,39 @@ FilledPixel continued(const OpenFrame& frame, std::span<const LocalSource> sourc
     return fill;
 }
 
+/// What is known of an open pixel.
+enum class Looked : std::uint8_t { no, filled, seenPast };
+
+/// Leaves those holes open of which sources see past most pixels: rays that graze what is around an
+/// opening look hidden here and there, and made slivers in it. Spot's control mesh, whose legs are
+/// close together, 40.7 -> 42.5 dB and 39.4 -> 40.7; the milk truck from five layouts up to 0.2;
+/// oak tree and statue 0.02 up and down. With 75 and 90 % instead of half no more.
+void leaveOpenings(Image<Looked>& looked) {
+    Image<std::uint8_t> visited(looked.width(), looked.height(), std::uint8_t{0});
+    std::vector<glm::ivec2> hole;
+    for (int y = 0; y < looked.height(); ++y) {
+        for (int x = 0; x < looked.width(); ++x) {
+            if (looked.at(x, y) == Looked::no || visited.at(x, y)) continue;
+            hole.assign(1, {x, y});
+            visited.at(x, y) = 1;
+            std::size_t filled = 0;
+            for (std::size_t i = 0; i < hole.size(); ++i) {
+                const glm::ivec2 at = hole[i];
+                filled += looked.at(at.x, at.y) == Looked::filled;
+                for (const auto [dx, dy] : kDirections) {
+                    const int u = at.x + dx, v = at.y + dy;
+                    if (!looked.contains(u, v) || visited.at(u, v) || looked.at(u, v) == Looked::no)
+                        continue;
+                    visited.at(u, v) = 1;
+                    hole.emplace_back(u, v);
+                }
+            }
+            if (2 * filled < hole.size())
+                for (const glm::ivec2 at : hole) looked.at(at.x, at.y) = Looked::seenPast;
+        }
+    }
+}
+
 }  // namespace
 
 void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int widest) {
@@ -223,6 +256,7 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int wides
     const int height = frame.q.height();
     const Image<std::uint8_t> distances = distancesToSurface(frame);
     std::vector<std::vector<FilledPixel>> rows(static_cast<std::size_t>(height));
+    Image<Looked> looked(frame.q.width(), height, Looked::no);
     parallelForBlocks(0, height, 8, [&](std::int64_t from, std::int64_t to) {
         unsigned far = 0;
         std::array<Rim, 8> room;
@@ -245,6 +279,7 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int wides
                     hiddenDepth(sources, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f,
                                 nearest + kInFront * scale,
                                 std::max(farthest - kBehind * scale, kFarthestShare * farthest));
+                looked.at(x, y) = hidden > 0.0f ? Looked::filled : Looked::seenPast;
                 if (!(hidden > 0.0f)) return;
                 rows[static_cast<std::size_t>(y)].push_back(
                     continued(frame, sources, x, y, hidden, rims));
@@ -255,13 +290,16 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int wides
         }
     });
     // Pixels are filled at the end, so that no fill feeds on another.
-    Image<std::uint8_t> filled(frame.q.width(), height, 0);
-    for (const auto& row : rows)
-        for (const FilledPixel& fill : row) filled.at(fill.x, fill.y) = 1;
+    leaveOpenings(looked);
+    for (auto& row : rows)
+        std::erase_if(row, [&](const FilledPixel& fill) {
+            return looked.at(fill.x, fill.y) != Looked::filled;
+        });
     const auto besideOpen = [&](int x, int y) {
         for (int v = y - 1; v <= y + 1; ++v)
             for (int u = x - 1; u <= x + 1; ++u)
-                if (filled.contains(u, v) && !filled.at(u, v) && !(frame.albedo.at(u, v).a > 0.0f))
+                if (looked.contains(u, v) && looked.at(u, v) != Looked::filled &&
+                    !(frame.albedo.at(u, v).a > 0.0f))
                     return true;
         return false;
     };
