@@ -328,8 +328,9 @@ CommandLine::~CommandLine() = default;
 
 Command CommandLine::add(const std::string& name, const std::string& help) {
     CLI::App* app = app_->add_subcommand(name, help);
-    entries_.push_back({app, std::make_unique<Command::Body>(), std::make_unique<PathOptions>()});
-    return {app, *entries_.back().body, *entries_.back().paths};
+    Entry& entry = entries_.emplace_back();
+    entry.app = app;
+    return {app, entry.body, entry.paths};
 }
 
 Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
@@ -349,8 +350,8 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
     }
     for (const auto& entry : entries_) {
         if (!entry.app->parsed()) continue;
-        STX_CHECK(checkPaths(*entry.app, *entry.paths));
-        return Request{{}, *entry.body, entry.app->get_name()};
+        STX_CHECK(checkPaths(*entry.app, entry.paths));
+        return Request{{}, entry.body, entry.app->get_name()};
     }
     return fail(ErrorCode::usage, "no command was given. See 'stx --help'.");
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <concepts>
+#include <deque>
 #include <functional>
 #include <initializer_list>
 #include <memory>
@@ -196,12 +197,12 @@ class CommandLine {
 
   private:
     struct Entry {
-        CLI::App* app;
-        std::unique_ptr<Command::Body> body;
-        std::unique_ptr<PathOptions> paths;
+        CLI::App* app = nullptr;
+        Command::Body body;
+        PathOptions paths;
     };
     std::unique_ptr<CLI::App> app_;
-    std::vector<Entry> entries_;
+    std::deque<Entry> entries_;  // commands refer to them
 };
 
 }  // namespace stx::tools

@@ -194,19 +194,17 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
         if (report.changed()) job.note(report.note());
         return better;
     };
-    const PageSet distinct = [&] {
+    PageSet chosen = [&] {
         const StageTimer timer(settings.log.get(), "twins", true);
         return settings.does(Stage::twins) ? set.distinct() : set;
     }();
-    const PageSet fine = [&] {
-        if (!settings.does(Stage::coarse) || !isOurs(backend, settings)) return distinct;
+    if (settings.does(Stage::coarse) && isOurs(backend, settings)) {
         StageTimer timer(settings.log.get(), "coarse", true);
         std::int64_t points = 0;
-        PageSet views = distinct.withoutCoarse(settings.mode == RenderMode::splat, points);
+        chosen = chosen.withoutCoarse(settings.mode == RenderMode::splat, points);
         timer.changed(points);
-        return views;
-    }();
-    const PageSet captured = solid(inFront(fine, settings, job));
+    }
+    const PageSet captured = solid(inFront(chosen, settings, job));
     STX_TRY(PageSet drawn, refined(captured));
     if (drawn.behind()) {
         STX_TRY(PageSet behind, refined(solid(*drawn.behind())));
