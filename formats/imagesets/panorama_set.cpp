@@ -90,8 +90,8 @@ Result<SetDescription> describePanorama(const path& given, const ImageSetOptions
         std::string ending = path(name).extension().string();
         std::transform(ending.begin(), ending.end(), ending.begin(),
                        [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-        static constexpr std::string_view kEndings[] = {".png", ".jpg",  ".jpeg", ".exr",
-                                                        ".tif", ".tiff", ".pfm",  ".hdr"};
+        static constexpr std::string_view kEndings[] = {".png",  ".jpg", ".jpeg", ".exr", ".tif",
+                                                        ".tiff", ".pfm", ".hdr",  ".npy", ".npz"};
         if (std::find(std::begin(kEndings), std::end(kEndings), ending) == std::end(kEndings))
             continue;
         const bool isDepth = name.find("depth") != std::string::npos ||

@@ -187,7 +187,8 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
         const std::string ending = fs::path(name).extension().string();
         exr += ending == ".exr";
         const bool picture = ending == ".png" || ending == ".jpg" || ending == ".exr" ||
-                             ending == ".pgm" || ending == ".ppm" || ending == ".pfm";
+                             ending == ".pgm" || ending == ".ppm" || ending == ".pfm" ||
+                             ending == ".npy" || ending == ".npz";
         pictures += picture;
         depths += picture && name.find("depth") != std::string::npos;
         disparities += picture && (name.starts_with("disp1.") || name.starts_with("disp2.") ||

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/images/npy.hpp"
 #include "formats/imagesets/lens.hpp"
 #include "formats/imagesets/msr.hpp"
 #include "formats/imagesets/panorama.hpp"
@@ -431,6 +432,21 @@ TEST(Panorama, FacesHoldTheRayLengths) {
             for (int x = 0; x < view.camera.width; ++x)
                 ASSERT_NEAR(glm::length(view.worldPoint(x, y) - centre), 2.0, 0.004) << view.name;
     }
+}
+
+TEST(Panorama, TakesAnArrayOfDepth) {
+    TemporaryFolder folder;
+    const Bytes depth = encodeNumpy(Image<float>(256, 128, 3.0f));
+    writeText(folder / "pano_depth.npy",
+              {reinterpret_cast<const char*>(depth.data()), depth.size()});
+    ReferenceView picture;
+    picture.texture = Rgba8Image(256, 128, {200, 100, 50, 255});
+    writeColour(folder / "pano.png", picture);
+    const auto read = readSet(folder.path());
+    ASSERT_TRUE(read) << read.error().text();
+    ASSERT_EQ(read->views.size(), 6u);
+    const ReferenceView& view = read->views[0];
+    EXPECT_NEAR(glm::length(view.worldPoint(10, 20)), 3.0, 1e-4);
 }
 
 }  // namespace
