@@ -277,7 +277,8 @@ void sayDrawn(const RenderOptions& o, const DrawnScene& scene, const Drawn& draw
               const std::vector<NovelCamera>& pictures, Program& program) {
     if (drawn.empty > 0)
         program.job.note(fmt::format(
-            "{} {} nothing{}: the object is behind or beside the camera; 'stx info' tells its "
+            "{} {} nothing{}: the object is behind or beside the camera, or smaller than a "
+            "pixel; 'stx info' tells its "
             "bounds",
             counted(drawn.empty, "picture"), drawn.empty == 1 ? "shows" : "show",
             scene.environment ? " but the environment" : ""));
