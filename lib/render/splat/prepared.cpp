@@ -114,42 +114,49 @@ struct Step {
     bool same;    ///< one surface
 };
 
-/// By steps along `way`, of unit length: it may be one surface however steep, see kAlike.
-Step stepTo(const Window& w, int x, int y, glm::ivec2 way) {
+/// Of one that is steeper than kSteepest, along `way`, of unit length: whether it is one of three
+/// in a row that are alike.
+bool goesOn(const Window& w, int x, int y, glm::ivec2 way, float slope) {
     const Camera& c = w.camera();
     const double f = way.x != 0 ? c.fx : c.fy;
     const auto depth = [&](int k) {
         const int i = x + k * way.x, j = y + k * way.y;
         return w.rectangle.shows(i, j) ? w.depth(i, j) : kNoDepth;
     };
-    // From pixel k - 1 to k. On a plane 1/z is linear in the picture, so the exact tangent divides
-    // by the other depth.
-    const auto tangent = [&](int k) {
-        const float to = depth(k);
-        return (to - depth(k - 1)) * static_cast<float>(c.orthographic ? f : f / to);
-    };
-    const float slope = tangent(1);
-    Step step{way.x + way.y > 0 ? slope : -slope, std::abs(slope) <= kSteepest};
-    if (step.same || !std::isfinite(slope)) return step;
-    // The tangents of a plane grow with the distance.
+    // From pixel k - 1 to k. The tangents of a plane grow with the distance.
     const auto alike = [&](int k) {
-        const float there = tangent(k) * (c.orthographic ? 1.0f : depth(0) / depth(k - 1));
+        const float from = depth(k - 1), to = depth(k);
+        const float there = (to - from) * static_cast<float>(c.orthographic ? f : f / to) *
+                            (c.orthographic ? 1.0f : w.depth(x, y) / from);
         return std::abs(there - slope) <= kAlike * std::abs(slope);
     };
     const int on = alike(2) ? 1 + alike(3) : 0, back = alike(0) ? 1 + alike(-1) : 0;
-    step.same = on + back >= 2;
-    return step;
+    return on + back >= 2;
+}
+
+/// Along (X, Y). A template, so that compilers write out the four ways.
+template <int X, int Y>
+Step stepTo(const Window& w, int x, int y, float z) {
+    const Camera& c = w.camera();
+    const double f = X != 0 ? c.fx : c.fy;
+    const int i = x + X, j = y + Y;
+    const float to = w.rectangle.shows(i, j) ? w.depth(i, j) : kNoDepth;
+    // On a plane 1/z is linear in the picture, so the exact tangent divides by the other depth.
+    const float slope = (to - z) * static_cast<float>(c.orthographic ? f : f / to);
+    return {
+        X + Y > 0 ? slope : -slope,
+        std::abs(slope) <= kSteepest || (std::isfinite(slope) && goesOn(w, x, y, {X, Y}, slope))};
 }
 
 /// The steps from a pixel to the four around it.
 struct Steps {
     Step left, right, up, down;
 
-    Steps(const Window& w, int x, int y)
-        : left(stepTo(w, x, y, {-1, 0})),
-          right(stepTo(w, x, y, {1, 0})),
-          up(stepTo(w, x, y, {0, -1})),
-          down(stepTo(w, x, y, {0, 1})) {}
+    Steps(const Window& w, int x, int y, float z)
+        : left(stepTo<-1, 0>(w, x, y, z)),
+          right(stepTo<1, 0>(w, x, y, z)),
+          up(stepTo<0, -1>(w, x, y, z)),
+          down(stepTo<0, 1>(w, x, y, z)) {}
 };
 
 /// The slope along one axis from the steps to both sides: of those on the same surface.
@@ -238,9 +245,10 @@ void prepareRow(const Window& w, const glm::mat3& cameraFromWorld, int y, Normal
     const Camera& camera = w.camera();
     for (int x = 0; x < camera.width; ++x) {
         const std::size_t i = w.texel(x, y);
-        if (!hasPoint(w.depth(x, y))) continue;
+        const float z = w.depth(x, y);
+        if (!hasPoint(z)) continue;
         const glm::vec3 ray = rayOf(camera, x, y);
-        const Steps steps(w, x, y);
+        const Steps steps(w, x, y, z);
         const auto at = [i](const Image<glm::vec3>* image) { return image->data()[i]; };
         glm::vec2 slope;
         const bool hasSplat =
