@@ -19,6 +19,11 @@ constexpr double kFiner = 2;
 /// coarser view, whose point is one of all that its pixel covers.
 constexpr float kShownDepth = 0.002f, kShownSpacings = 1.0f;
 
+/// A view is left out when it alone shows no more than this share of its points, which are those at
+/// edges. Of 60 random sets with such a view (seed 7701 of the sweep's rule `coarser`) five lose
+/// 0.8 to 4.3 dB where it has to be none, one with 0.05 or 0.1.
+constexpr double kRest = 0.05;
+
 /// Of a camera, over depth unless it is orthographic.
 float spacingOf(const Camera& camera) {
     return static_cast<float>(1.0 / std::min(camera.fx, camera.fy));
@@ -91,7 +96,7 @@ PageSet PageSet::withoutCoarse(bool single, std::int64_t& points) const {
         settle();
         const Camera& camera = views()[view].camera;
         Image<std::uint8_t> needless(camera.width, camera.height, std::uint8_t{0});
-        std::atomic<bool> all = true;
+        std::atomic<std::int64_t> others = 0;  // points that only this view shows
         parallelForBlocks(0, camera.height, 16, [&](std::int64_t from, std::int64_t to) {
             for (int y = static_cast<int>(from); y < to; ++y) {
                 for (int x = 0; x < camera.width; ++x) {
@@ -100,13 +105,13 @@ PageSet PageSet::withoutCoarse(bool single, std::int64_t& points) const {
                     needless.at(x, y) = std::ranges::any_of(finer, [&](const Finer& f) {
                         return f.shows(x, y, z, spacingAt(camera, z));
                     });
-                    if (!needless.at(x, y)) all = false;
+                    if (!needless.at(x, y)) ++others;
                 }
             }
         });
-        const auto count = std::ranges::count(needless.pixels(), 1);
-        kept[view] = !all;
-        if (!all && (!single || count == 0)) continue;
+        const std::int64_t count = std::ranges::count(needless.pixels(), 1);
+        kept[view] = static_cast<double>(others) > kRest * static_cast<double>(count + others);
+        if (kept[view] && (!single || count == 0)) continue;
         points += count;
         if (!data) data = std::make_shared<Data>(*data_);
         for (const PageRectangle& r : rectanglesOf(view)) {

@@ -140,7 +140,7 @@ class PageSet {
     /// where `captured`, these views before they were refined, has no such pixels; `pixels` tells
     /// how many.
     [[nodiscard]] PageSet withUnmeasured(const PageSet& captured, std::int64_t& pixels) const;
-    /// The same without views of whose points all are shown at least twice as finely by others:
+    /// The same without views of whose points 95 % are shown at least twice as finely by others:
     /// large splats stick out beyond outlines that finer views know, and depth of large pixels
     /// says little. With `single`, such points of other views are left out, too; surface mode would
     /// take what they leave for free. `points` tells how many.
