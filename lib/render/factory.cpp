@@ -198,10 +198,11 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
         const StageTimer timer(settings.log.get(), "twins", true);
         return settings.does(Stage::twins) ? set.distinct() : set;
     }();
-    if (settings.does(Stage::coarse) && isOurs(backend, settings)) {
+    if (settings.mode == RenderMode::splat && settings.does(Stage::coarse) &&
+        isOurs(backend, settings)) {
         StageTimer timer(settings.log.get(), "coarse", true);
         std::int64_t points = 0;
-        chosen = chosen.withoutCoarse(settings.mode == RenderMode::splat, points);
+        chosen = chosen.withoutCoarse(points);
         timer.changed(points);
     }
     const PageSet captured = solid(inFront(chosen, settings, job));

@@ -32,7 +32,7 @@ const std::vector<SweepRule>& rules() {
          measures::viewTwice},
         {"nothing", "a view that shows nothing changes nothing", 0.3, "dB", kAlike, 0.1,
          measures::viewOfNothing},
-        {"coarser", "a view of few pixels makes no picture worse", 0.3, "dB",
+        {"coarser", "a view of few pixels makes no splats worse", 0.3, "dB",
          "what it alone shows may be drawn beside what is finer", 0.1, measures::viewOfFewPixels},
         {"turned", "the world turned by a quarter gives the same picture", 0.3, "dB", kAlike, 0.1,
          measures::turned},

@@ -134,7 +134,7 @@ Outcome viewOfFewPixels(Pictures& pictures) {
                                                              std::max(1, fine.height / fewer))));
     bundle.views.back().name = "few pixels";
     bundle.views.back().depthBits = captured.bundle.views[which].depthBits;
-    const Drawn how = modeOf(pictures, 37);
+    const Drawn how{RenderMode::splat};
     STX_TRY(const Frame changed, drawBundle(bundle, captured.novel, how));
     return worseThanBefore(pictures, how, changed);
 }

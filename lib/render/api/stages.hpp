@@ -13,7 +13,7 @@ namespace stx {
 /// RenderSettings::does() whether it is wanted. Steps of refining are beside: lib/refine/refine.hpp.
 #define STX_STAGES(STAGE) \
     STAGE(twins, both, "views that repeat another are drawn as one", "") \
-    STAGE(coarse, both, "points that another view shows twice as finely are left out", "") \
+    STAGE(coarse, splat, "points that another view shows twice as finely are left out", "") \
     STAGE(solid, surface, "what is translucent inside of the object is drawn opaque", "") \
     STAGE(unmeasured, both, "colours without depth are drawn where nothing else is", \
           "Bleyer, Rhemann & Rother 2011") \

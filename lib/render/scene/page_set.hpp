@@ -140,11 +140,10 @@ class PageSet {
     /// where `captured`, these views before they were refined, has no such pixels; `pixels` tells
     /// how many.
     [[nodiscard]] PageSet withUnmeasured(const PageSet& captured, std::int64_t& pixels) const;
-    /// The same without views of whose points 95 % are shown at least twice as finely by others:
-    /// large splats stick out beyond outlines that finer views know, and depth of large pixels
-    /// says little. With `single`, such points of other views are left out, too; surface mode would
-    /// take what they leave for free. `points` tells how many.
-    [[nodiscard]] PageSet withoutCoarse(bool single, std::int64_t& points) const;
+    /// The same without points that others show at least twice as finely, and without views of
+    /// which 95 % are such, for splat mode: large splats stick out beyond outlines that finer views
+    /// know. `points` tells how many.
+    [[nodiscard]] PageSet withoutCoarse(std::int64_t& points) const;
     /// Scene units: points of withUnmeasured() farther than half of this are "far away", since
     /// nobody knows where they are. 0 for other sets.
     [[nodiscard]] double farAway() const { return data_->farAway; }

@@ -22,10 +22,10 @@ Bundle fineViews() {
     return bundle;
 }
 
-Image<glm::vec4> draw(const Bundle& bundle, RenderMode mode) {
+Image<glm::vec4> draw(const Bundle& bundle) {
     Job job;
     RenderSettings settings;
-    settings.mode = mode;
+    settings.mode = RenderMode::splat;
     const auto renderer = makeRenderer(Backend::cpu, bundle, settings, -1, job);
     EXPECT_TRUE(renderer);
     return (*renderer)
@@ -39,9 +39,7 @@ TEST(CoarsePages, AViewOfFewPixelsChangesNothing) {
     for (const int side : {1, 12}) {
         Bundle mixed = fineViews();
         mixed.views.insert(mixed.views.begin() + 3, viewOf(2.2, side));
-        for (const RenderMode mode : {RenderMode::surface, RenderMode::splat})
-            EXPECT_TRUE(draw(mixed, mode) == draw(fineViews(), mode))
-                << side << ", mode " << int(mode);
+        EXPECT_TRUE(draw(mixed) == draw(fineViews())) << side;
     }
 }
 
@@ -50,12 +48,12 @@ TEST(CoarsePages, WhatOnlyACoarseViewShowsStays) {
     Bundle apart;
     apart.views = {viewOf(0, 96), viewOf(kViews / 2, 12)};  // from the other side
     const PageSet set(apart);
-    EXPECT_EQ(set.withoutCoarse(true, points).views().size(), 2u);
+    EXPECT_EQ(set.withoutCoarse(points).views().size(), 2u);
     EXPECT_LT(points, set.pointCount() / 100);
     // Views as fine as each other are left as they are.
     const Bundle same = fineViews();
     const PageSet fine(same);
-    EXPECT_EQ(fine.withoutCoarse(true, points).pages().data(), fine.pages().data());
+    EXPECT_EQ(fine.withoutCoarse(points).pages().data(), fine.pages().data());
     EXPECT_EQ(points, 0);
 }
 
@@ -69,7 +67,7 @@ TEST(CoarsePages, AreLeftOutOfAtlases) {
     const auto set = PageSet::of(*atlas, job);
     ASSERT_TRUE(set);
     std::int64_t points = 0;
-    EXPECT_EQ(set->withoutCoarse(true, points).views().size(), fineViews().views.size());
+    EXPECT_EQ(set->withoutCoarse(points).views().size(), fineViews().views.size());
     EXPECT_EQ(points, mixed.views.back().pointCount());
 }
 

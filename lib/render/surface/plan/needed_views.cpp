@@ -100,11 +100,12 @@ bool sees(const ReferenceView& view, const ViewSummary& summary, double least,
 }
 
 /// Whether there are views that may be left out for others (stages `twins` and `coarse`).
-bool anyForOthers(const std::vector<ReferenceView>& views) {
+bool anyForOthers(const std::vector<ReferenceView>& views, bool splats) {
     for (std::size_t i = 0; i < views.size(); ++i)
         for (std::size_t k = 0; k < i; ++k)
             if (sameCamera(views[i].camera, views[k].camera) ||
-                isClearlyFiner(views[i], views[k]) || isClearlyFiner(views[k], views[i]))
+                (splats &&
+                 (isClearlyFiner(views[i], views[k]) || isClearlyFiner(views[k], views[i]))))
                 return true;
     return false;
 }
@@ -123,7 +124,7 @@ std::vector<bool> neededViews(const std::vector<ReferenceView>& views,
     const bool splats = settings.mode == RenderMode::splat;
     // The paper's rule is fitted to all views, and points know each other by their number.
     if ((splats && settings.splat != SplatRule::data) || summaries.size() != views.size() ||
-        anyForOthers(views))
+        anyForOthers(views, splats))
         return needed;
     for (std::size_t i = 0; i < views.size(); ++i)
         if (!tellsWithoutPixels(views[i]) || summaries[i].translucent) return needed;
