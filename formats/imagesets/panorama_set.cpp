@@ -86,16 +86,24 @@ Result<SetDescription> describePanorama(const path& given, const ImageSetOptions
                       "expected");
     std::string texture = filled(options.texturePattern, {"", 0, 0, options.frame});
     std::string depth = filled(options.depthPattern, {"", 0, 0, options.frame});
+    std::string depthArray;
     for (const std::string& name : filesIn(given)) {
         std::string ending = path(name).extension().string();
         std::transform(ending.begin(), ending.end(), ending.begin(),
                        [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-        static constexpr std::string_view kEndings[] = {".png",  ".jpg", ".jpeg", ".exr", ".tif",
-                                                        ".tiff", ".pfm", ".hdr",  ".npy", ".npz"};
-        if (std::find(std::begin(kEndings), std::end(kEndings), ending) == std::end(kEndings))
+        static constexpr std::string_view kEndings[] = {".png", ".jpg",  ".jpeg", ".exr",
+                                                        ".tif", ".tiff", ".pfm",  ".hdr"};
+        const bool array = ending == ".npy" || ending == ".npz";
+        if (std::find(std::begin(kEndings), std::end(kEndings), ending) == std::end(kEndings) &&
+            !array)
             continue;
         const bool isDepth = name.find("depth") != std::string::npos ||
                              name.find("Depth") != std::string::npos || ending == ".pfm";
+        if (array) {
+            // Beside pictures there may be any: poses, intrinsics.
+            if (isDepth && depthArray.empty()) depthArray = name;
+            continue;
+        }
         std::string& to = isDepth ? depth : texture;
         if (!(isDepth ? options.depthPattern : options.texturePattern).empty()) continue;
         if (!to.empty())
@@ -105,6 +113,7 @@ Result<SetDescription> describePanorama(const path& given, const ImageSetOptions
                           to, name, isDepth ? "depth" : "picture");
         to = name;
     }
+    if (depth.empty()) depth = depthArray;
     if (texture.empty() || depth.empty())
         return failAt(where, ErrorCode::io,
                       "no {} was found in it; a panorama is a picture and a depth image with "

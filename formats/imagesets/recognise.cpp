@@ -180,22 +180,24 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
     if (has("depth") && (has("color") || has("image") || has("rgb")) &&
         !trajectoryLogIn(path).empty())
         return std::string("open3d");
-    int pictures = 0, exr = 0, disparities = 0, depths = 0;
+    int pictures = 0, exr = 0, disparities = 0, depths = 0, depthArrays = 0;
     for (const std::string& name : files) {
         if (name.ends_with(".pose.txt")) return std::string("7scenes");
         if (name.ends_with(".gt.freiburg")) return std::string("tum");
         const std::string ending = fs::path(name).extension().string();
         exr += ending == ".exr";
         const bool picture = ending == ".png" || ending == ".jpg" || ending == ".exr" ||
-                             ending == ".pgm" || ending == ".ppm" || ending == ".pfm" ||
-                             ending == ".npy" || ending == ".npz";
+                             ending == ".pgm" || ending == ".ppm" || ending == ".pfm";
+        const bool array = ending == ".npy" || ending == ".npz";
         pictures += picture;
         depths += picture && name.find("depth") != std::string::npos;
+        depthArrays += array && name.find("depth") != std::string::npos;
         disparities += picture && (name.starts_with("disp1.") || name.starts_with("disp2.") ||
                                    name.starts_with("disp5.") || name.starts_with("disp6."));
     }
     if (disparities > 0 && pictures > disparities) return std::string("middlebury");
-    if (pictures == 2 && depths == 1) return std::string("panorama");
+    if ((pictures == 2 && depths == 1) || (pictures == 1 && depths == 0 && depthArrays == 1))
+        return std::string("panorama");
     if (exr > 0) return std::string("exr");
     // A camera list that cannot be read is a likelier reason than none.
     if (broken) return tl::unexpected(*broken);

@@ -37,10 +37,6 @@ std::optional<ReferenceView> layerOf(const ReferenceView& captured, const Image<
 
 }  // namespace
 
-bool mayHaveUnmeasured(const ViewHeader& view) {
-    return view.noDepth == NoDepth::unknown && !view.pruned && !view.background;
-}
-
 Bundle unmeasuredViews(const Bundle& all) {
     Bundle out;
     out.origin = all.origin;

@@ -6,10 +6,6 @@
 
 namespace stx {
 
-/// Whether a view may have pixels of a surface whose distance nobody measured, which
-/// unmeasuredViews() gives places to. Its pixels are not looked at.
-[[nodiscard]] bool mayHaveUnmeasured(const ViewHeader& view);
-
 /// What `stx render` draws behind all views (stage `unmeasured`), as views that a page can hold:
 /// pixels of full alpha without depth, with the places that unmeasuredDepth() finds. A camera has
 /// up to two: one for pixels that have a place, with the points beside them, and one for those that

@@ -16,6 +16,7 @@
 #include "lib/model/peak_memory.hpp"
 #include "lib/model/view_table.hpp"
 #include "lib/packing/packing.hpp"
+#include "lib/refine/unmeasured.hpp"
 #include "lib/render/scene/page_set.hpp"
 
 namespace stx {

@@ -19,6 +19,11 @@ struct UnmeasuredDepth {
     std::int64_t placed = 0, far = 0;
 };
 
+/// Whether a view may have such pixels. Its own are not looked at.
+[[nodiscard]] inline bool mayHaveUnmeasured(const ViewHeader& view) {
+    return view.noDepth == NoDepth::unknown && !view.pruned && !view.background;
+}
+
 /// Gives pixels of full alpha without depth the planes of the points around them, spread from pixel
 /// to pixel as in PatchMatch stereo (Bleyer, Rhemann & Rother 2011): each takes its neighbour's
 /// where other views show the same colours there, and nothing that they measured is before or

@@ -163,15 +163,10 @@ double areaOf(std::size_t own, double ownDensity, std::size_t views, std::int64_
     return static_cast<double>(stride) / density;
 }
 
-struct Seen {
-    std::uint32_t sample;
-    float cosine, density;
-};
-
 /// What a candidate sees of samples; `sighting`: how it sees sample i.
 template <class SightingOfSample>
-std::vector<Seen> seenOf(std::size_t samples, const SightingOfSample& sighting) {
-    std::vector<Seen> seen;
+std::vector<SeenSample> seenOf(std::size_t samples, const SightingOfSample& sighting) {
+    std::vector<SeenSample> seen;
     for (std::size_t i = 0; i < samples; ++i) {
         const Sighting s = sighting(i);
         if (s.visible)
@@ -182,8 +177,15 @@ std::vector<Seen> seenOf(std::size_t samples, const SightingOfSample& sighting) 
     return seen;
 }
 
-CoverProblem problemOf(const std::vector<SurfaceSample>& samples,
-                       std::vector<std::vector<Seen>> seen, double targetDensity) {
+}  // namespace
+
+std::vector<SeenSample> seenBy(const CandidateView& view,
+                               const std::vector<SurfaceSample>& samples) {
+    return seenOf(samples.size(), [&](std::size_t i) { return sightingOf(view, samples[i]); });
+}
+
+CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
+                          std::vector<std::vector<SeenSample>> seen, double targetDensity) {
     CoverProblem problem;
     for (const auto& s : samples) problem.weights.push_back(s.area);
     double target = targetDensity;
@@ -201,7 +203,7 @@ CoverProblem problemOf(const std::vector<SurfaceSample>& samples,
     }
     problem.views.resize(seen.size());
     for (std::size_t v = 0; v < seen.size(); ++v) {
-        const std::vector<Seen> of = std::exchange(seen[v], {});
+        const std::vector<SeenSample> of = std::exchange(seen[v], {});
         problem.views[v].reserve(of.size());
         for (const auto& s : of) {
             const double rate = target > 0 ? std::min(1.0, s.density / target) : 1.0;
@@ -210,8 +212,6 @@ CoverProblem problemOf(const std::vector<SurfaceSample>& samples,
     }
     return problem;
 }
-
-}  // namespace
 
 std::vector<SurfaceSample> setAreas(const std::vector<ViewSamples>& ofViews,
                                     std::span<const std::vector<Sighting>> seen,
@@ -266,20 +266,18 @@ void weighSides(const std::vector<SurfaceSample>& samples, CoverProblem& problem
 
 CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
                           const std::vector<CandidateView>& candidates, double targetDensity) {
-    std::vector<std::vector<Seen>> seen(candidates.size());
-    parallelFor(0, candidates.size(), [&](std::int64_t v) {
-        seen[v] = seenOf(samples.size(),
-                         [&](std::size_t i) { return sightingOf(candidates[v], samples[i]); });
-    });
-    return problemOf(samples, std::move(seen), targetDensity);
+    std::vector<std::vector<SeenSample>> seen(candidates.size());
+    parallelFor(0, candidates.size(),
+                [&](std::int64_t v) { seen[v] = seenBy(candidates[v], samples); });
+    return coverProblem(samples, std::move(seen), targetDensity);
 }
 
 CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
                           std::span<const std::vector<Sighting>> sightings, double targetDensity) {
-    std::vector<std::vector<Seen>> seen;
+    std::vector<std::vector<SeenSample>> seen;
     for (const std::vector<Sighting>& of : sightings)
         seen.push_back(seenOf(samples.size(), [&](std::size_t i) { return of[i]; }));
-    return problemOf(samples, std::move(seen), targetDensity);
+    return coverProblem(samples, std::move(seen), targetDensity);
 }
 
 Result<CoverProblem> coverProblem(const ViewTable& table, std::int64_t points, int count,
@@ -308,7 +306,7 @@ Result<CoverProblem> coverProblem(const ViewTable& table, std::int64_t points, i
     // Sums as of areaOf(): in the order of the views.
     std::vector<double> density(samples.size(), 0.0);
     std::vector<std::vector<double>> added(views);
-    std::vector<std::vector<Seen>> seen(views);
+    std::vector<std::vector<SeenSample>> seen(views);
     const auto look = [&](std::size_t k,
                           const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
         const CandidateView candidate = candidateOf(*view);
@@ -328,7 +326,7 @@ Result<CoverProblem> coverProblem(const ViewTable& table, std::int64_t points, i
     STX_CHECK(forEachView(table, peak::kSelect, job, look, add));
     for (std::size_t i = 0; i < samples.size(); ++i)
         samples[i].area = static_cast<double>(stride) / density[i];
-    return problemOf(samples, std::move(seen), targetDensity);
+    return coverProblem(samples, std::move(seen), targetDensity);
 }
 
 }  // namespace stx

@@ -53,6 +53,15 @@ struct Sighting {
 };
 [[nodiscard]] Sighting sightingOf(const CandidateView& view, const SurfaceSample& sample);
 
+/// What a candidate sees of one sample.
+struct SeenSample {
+    std::uint32_t sample;
+    float cosine, density;  ///< see Sighting
+};
+/// What a candidate sees of samples.
+[[nodiscard]] std::vector<SeenSample> seenBy(const CandidateView& view,
+                                             const std::vector<SurfaceSample>& samples);
+
 /// A view of a bundle as a candidate; its depth must outlive it.
 [[nodiscard]] CandidateView candidateOf(const ReferenceView& view);
 
@@ -74,9 +83,9 @@ using SurfaceAt = std::function<std::pair<float, glm::vec2>(int x, int y)>;
                                                   std::int64_t stride);
 
 /// Weighs the two sides of pieces by how many views see each, the one that more see in full: the
-/// inside of what is closed is no surface to look for, and what shows through a narrow gap little
-/// (a teapot whose lid does not close: 44.2 dB by twelve views when it counts in full, 49.5 so). Of
-/// pieces that no view sees, one side counts.
+/// inside of what is closed is not a surface to look for, and what shows through a narrow gap
+/// little (a teapot whose lid does not close: 44.2 dB by twelve views when it counts in full, 49.5
+/// so). Of pieces that no view sees, one side counts.
 void weighSides(const std::vector<SurfaceSample>& samples, CoverProblem& problem);
 
 /// The problem of choosing among candidates. How finely a view samples a piece of surface is
@@ -89,6 +98,10 @@ void weighSides(const std::vector<SurfaceSample>& samples, CoverProblem& problem
 /// candidate has.
 [[nodiscard]] CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
                                         const std::vector<CandidateView>& candidates,
+                                        double targetDensity);
+/// The same; `seen`: by candidate. Takes less memory than their images.
+[[nodiscard]] CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
+                                        std::vector<std::vector<SeenSample>> seen,
                                         double targetDensity);
 /// The same; `seen`: for each candidate a sighting of each sample.
 [[nodiscard]] CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,

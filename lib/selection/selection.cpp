@@ -160,9 +160,11 @@ Result<MeshSelection> selectMeshViews(const Mesh& mesh, const MeshCandidates& ca
     layout.count = candidates.directions;
     STX_TRY(const auto cameras, layoutCameras(layout, candidates.framing, drawnPoints(mesh)));
 
+    const auto samples = sampleMesh(mesh, settings.samples);
+    if (samples.empty())
+        return fail(ErrorCode::invalidInput, "the mesh has no surface to select views for");
     const auto count = static_cast<std::int64_t>(cameras.size());
-    std::vector<CandidateView> views(cameras.size());
-    std::vector<RasterImage> seen(cameras.size());
+    std::vector<std::vector<SeenSample>> seen(cameras.size());
     std::atomic<std::int64_t> finished = 0;
     const auto looked = parallelTry(0, count, [&](std::int64_t i) -> Result<void> {
         STX_CHECK(job.checkCancelled());
@@ -172,27 +174,22 @@ Result<MeshSelection> selectMeshViews(const Mesh& mesh, const MeshCandidates& ca
         const auto shrunk = [&](int side) {
             return std::max(1, static_cast<int>(std::lround(side * scale)));
         };
-        views[i].camera = camera;
-        views[i].depthCamera =
+        CandidateView view;
+        view.camera = camera;
+        view.depthCamera =
             scale < 1 ? camera.resized(shrunk(camera.width), shrunk(camera.height)) : camera;
         RasterSettings raster;
         raster.supersampling = 1;
         raster.normals = true;
-        STX_SET(seen[i], rasterise(mesh, views[i].depthCamera, raster, job));
-        seen[i].colour = {};
+        STX_TRY(const auto image, rasterise(mesh, view.depthCamera, raster, job));
+        view.depth = &image.depth;
+        view.normal = &image.normal;
+        seen[i] = seenBy(view, samples);
         job.progress(++finished, count, "looking from candidate directions");
         return {};
     });
     STX_CHECK(looked);
-    for (std::size_t i = 0; i < views.size(); ++i) {
-        views[i].depth = &seen[i].depth;
-        views[i].normal = &seen[i].normal;
-    }
-
-    const auto samples = sampleMesh(mesh, settings.samples);
-    if (samples.empty())
-        return fail(ErrorCode::invalidInput, "the mesh has no surface to select views for");
-    auto problem = coverProblem(samples, views, settings.targetDensity);
+    auto problem = coverProblem(samples, std::move(seen), settings.targetDensity);
     weighSides(samples, problem);
     STX_CHECK(job.checkCancelled());
     MeshSelection result;

@@ -140,8 +140,8 @@ class PageSet {
     /// where `captured`, these views before they were refined, has no such pixels; `pixels` tells
     /// how many.
     [[nodiscard]] PageSet withUnmeasured(const PageSet& captured, std::int64_t& pixels) const;
-    /// The same without points that others show at least twice as finely, and without views of
-    /// which 95 % are such, for splat mode: large splats stick out beyond outlines that finer views
+    /// The same without points that others show at least twice as finely, and without views that
+    /// have no others, for splat mode: large splats stick out beyond outlines that finer views
     /// know. `points` tells how many.
     [[nodiscard]] PageSet withoutCoarse(std::int64_t& points) const;
     /// Scene units: points of withUnmeasured() farther than half of this are "far away", since
@@ -248,6 +248,10 @@ class PageSet {
     };
     explicit PageSet(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
     [[nodiscard]] PageSet only(const std::vector<bool>& kept) const;
+    /// The set of `data`, a copy of these that may have been changed, with another depth for pages
+    /// that have one in `depths`, before the same background.
+    [[nodiscard]] PageSet withDepths(std::shared_ptr<Data> data,
+                                     std::vector<std::shared_ptr<Image<float>>> depths) const;
     static void addBundle(const Bundle& bundle, Data& data);
     static void addRectangle(const AtlasRectangle& from, int padding, Data& data);
     static void buildIndex(Data& data);

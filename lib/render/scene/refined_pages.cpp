@@ -59,6 +59,19 @@ bool PageSet::mayRefine(const RefineSettings& settings) const {
     return needs.any();
 }
 
+PageSet PageSet::withDepths(std::shared_ptr<Data> data,
+                            std::vector<std::shared_ptr<Image<float>>> depths) const {
+    for (std::size_t i = 0; i < depths.size(); ++i) {
+        if (!depths[i]) continue;
+        depths[i]->moveTo(spool());
+        data->pages[i].depth = depths[i].get();
+        data->refined.push_back(std::move(depths[i]));
+    }
+    PageSet set(std::move(data));
+    set.behind_ = behind_;
+    return set;
+}
+
 PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report,
                          std::int64_t atOnce) const {
     RefineReport own;
@@ -94,15 +107,7 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report,
             putDepth(*better[i].depth, r, *depth);
         }
     }
-    for (std::size_t i = 0; i < depths.size(); ++i) {
-        if (!depths[i]) continue;
-        depths[i]->moveTo(spool());
-        data->pages[i].depth = depths[i].get();
-        data->refined.push_back(std::move(depths[i]));
-    }
-    PageSet set(std::move(data));
-    set.behind_ = behind_;
-    return set;
+    return withDepths(std::move(data), std::move(depths));
 }
 
 }  // namespace stx

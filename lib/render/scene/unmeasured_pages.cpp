@@ -9,8 +9,7 @@ namespace stx {
 PageSet PageSet::withUnmeasured(const PageSet& captured, std::int64_t& pixels) const {
     pixels = 0;
     std::vector<bool> wanted;
-    for (const PageView& v : captured.views())
-        wanted.push_back(v.noDepth == NoDepth::unknown && !v.pruned && !v.background);
+    for (const PageView& v : captured.views()) wanted.push_back(mayHaveUnmeasured(v));
     if (std::ranges::find(wanted, true) == wanted.end()) return *this;
     std::vector<ReferenceView> copies(views().size());
     std::vector<RefineView> given;

@@ -447,6 +447,12 @@ TEST(Panorama, TakesAnArrayOfDepth) {
     ASSERT_EQ(read->views.size(), 6u);
     const ReferenceView& view = read->views[0];
     EXPECT_NEAR(glm::length(view.worldPoint(10, 20)), 3.0, 1e-4);
+    // Beside pictures arrays may be anything.
+    writeText(folder / "poses.npy", {reinterpret_cast<const char*>(depth.data()), depth.size()});
+    writeCodes(folder / "depth.png", 256, 128, 16, [](int, int) { return 2000; });
+    const auto picturesFirst = readSet(folder.path());
+    ASSERT_TRUE(picturesFirst) << picturesFirst.error().text();
+    EXPECT_NEAR(glm::length(picturesFirst->views[0].worldPoint(10, 20)), 2.0, 1e-3);
 }
 
 }  // namespace

@@ -50,11 +50,61 @@ TEST(CoarsePages, WhatOnlyACoarseViewShowsStays) {
     const PageSet set(apart);
     EXPECT_EQ(set.withoutCoarse(points).views().size(), 2u);
     EXPECT_LT(points, set.pointCount() / 100);
+    // However little it is, within its surface.
+    Bundle most = fineViews();
+    const ReferenceView coarse = viewOf(2.2, 12);
+    const auto shown = [&](int x, int y) { return hasPoint(coarse.depth.at(x, y)); };
+    glm::ivec2 at(-1);
+    for (int y = 1; y < 11; ++y)
+        for (int x = 1; x < 11; ++x)
+            if (shown(x, y) && shown(x - 1, y) && shown(x + 1, y) && shown(x, y - 1) &&
+                shown(x, y + 1))
+                at = {x, y};
+    ASSERT_GE(at.x, 0);
+    const glm::dvec3 middle = coarse.worldPoint(at.x, at.y);
+    const double pixel = coarse.camera.sampleSpacing(coarse.depth.at(at.x, at.y)).x;
+    for (ReferenceView& view : most.views)
+        for (int y = 0; y < view.depth.height(); ++y)
+            for (int x = 0; x < view.depth.width(); ++x)
+                if (hasPoint(view.depth.at(x, y)) &&
+                    glm::distance(view.worldPoint(x, y), middle) < 0.5 * pixel)
+                    view.depth.at(x, y) = kNoDepth;
+    most.views.push_back(coarse);
+    const PageSet nearlyAll(most);
+    const PageSet left = nearlyAll.withoutCoarse(points);
+    EXPECT_EQ(left.views().size(), most.views.size());
+    EXPECT_LT(points, coarse.pointCount());
+    EXPECT_GT(points, coarse.pointCount() / 2);
+    EXPECT_TRUE(hasPoint(left.depth(most.views.size() - 1, at.x, at.y)));
     // Views as fine as each other are left as they are.
     const Bundle same = fineViews();
     const PageSet fine(same);
     EXPECT_EQ(fine.withoutCoarse(points).pages().data(), fine.pages().data());
     EXPECT_EQ(points, 0);
+}
+
+/// A sheet without thickness: fine views of its back do not show its front.
+TEST(CoarsePages, TheFrontOfASheetStays) {
+    Bundle sheet;
+    for (const auto& [side, z] : {std::pair{96, -3.0}, std::pair{12, 3.0}}) {
+        ReferenceView& view = sheet.views.emplace_back();
+        view.name = z > 0 ? "front" : "back";
+        view.camera = Camera::fromFieldOfView({0, 0, z}, *lookAt({0, 0, z}, {0, 0, 0}),
+                                              glm::dvec2(0.5), false, side, side);
+        view.nearPlane = 2.9;
+        view.farPlane = 3.1;
+        view.texture = Rgba8Image(side, side, glm::u8vec4(255));
+        view.depth = Image<float>(side, side, 3.0f);
+    }
+    std::int64_t points = 0;
+    const PageSet set(sheet);
+    EXPECT_EQ(set.withoutCoarse(points).views().size(), 2u);
+    EXPECT_EQ(points, 0);
+    // From the same side they do.
+    sheet.views[0].camera = sheet.views[1].camera.resized(96, 96);
+    const PageSet front(sheet);
+    EXPECT_EQ(front.withoutCoarse(points).views().size(), 1u);
+    EXPECT_EQ(points, 144);
 }
 
 /// In an atlas, too, where views are rectangles.
