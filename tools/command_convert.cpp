@@ -497,8 +497,9 @@ void addSetOptions(Command& c, const std::shared_ptr<ConvertOptions>& o) {
         .takes("N");
     c.flag(
         "--strict", o->open.set.strict,
-        "Stop at a view whose files are missing (transforms, TUM, 7-Scenes), instead of leaving "
-        "it out, and at frames of films that are missing or damaged, instead of showing the ones "
+        "Stop at a view whose files are missing (transforms, TUM, 7-Scenes) or that has no usable "
+        "depth, instead of leaving it out, and at frames of films that are missing or damaged, "
+        "instead of showing the ones "
         "before");
 }
 

@@ -40,8 +40,8 @@ struct ImageSetOptions {
     /// value: as the kind of set usually is (recordings of a moving camera are of one moment).
     std::optional<bool> moving;
     int every = 1;  ///< takes each N-th view, for recordings of thousands
-    /// A view whose files are missing is an error, not a note (transforms, TUM, 7-Scenes), and so
-    /// is a picture of a film that is missing or damaged.
+    /// A view whose files are missing (transforms, TUM, 7-Scenes) or of which no pixel has a usable
+    /// depth is an error, not a note, and so is a picture of a film that is missing or damaged.
     bool strict = false;
     /// Depth range that the set itself does not have (MSR, films), scene units; 0, 0 = not given.
     double depthMin = 0, depthMax = 0;

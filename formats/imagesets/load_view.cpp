@@ -360,24 +360,33 @@ Result<void> toDistances(const SetView& set, const ImageSetOptions& options, Cam
     return shiftTogether(set, options, camera, smoothed, stored, report, job);
 }
 
-Result<void> needDepth(const Image<float>& depth) {
+/// Errors where no pixel has a depth, and `showsNothing` becomes true then.
+Result<void> needDepth(const Image<float>& depth, bool& showsNothing,
+                       const std::string& otherwise) {
     if (anyPoint(depth)) return {};
-    return fail(ErrorCode::invalidInput,
-                "not one of its {}x{} pixels has a valid depth; at least one is needed",
-                depth.width(), depth.height());
+    showsNothing = true;
+    return fail(ErrorCode::invalidInput, "{}", otherwise);
+}
+
+/// The same of depth as it was stored.
+Result<void> needDepth(const Image<float>& depth, bool& showsNothing) {
+    return needDepth(depth, showsNothing,
+                     fmt::format("not one of its {}x{} pixels has a valid depth; at least one is "
+                                 "needed",
+                                 depth.width(), depth.height()));
 }
 
 /// Makes distances of the values of a depth camera, seen by the camera of the picture: on its
 /// pixels, or on fewer and larger ones where the depth has fewer.
 Result<void> takeToPicture(const SetView& set, const ImageSetOptions& options, StoredView& stored,
-                           NoDepth& noDepth, RefineReport& report, Job& job) {
+                           NoDepth& noDepth, RefineReport& report, bool& showsNothing, Job& job) {
     const int tw = stored.texture.width(), th = stored.texture.height();
     STX_TRY(Camera to, cameraOfSize(set, tw, th));
     Camera from = *set.depthCamera;
     from.width = stored.depth.width();
     from.height = stored.depth.height();
     STX_CHECK(toDistances(set, options, from, stored, noDepth, report, job));
-    STX_CHECK(needDepth(stored.depth));
+    STX_CHECK(needDepth(stored.depth, showsNothing));
     if (from.width < tw)
         to = to.resized(from.width,
                         std::max(1, static_cast<int>(std::lround(1.0 * th * from.width / tw))));
@@ -387,16 +396,14 @@ Result<void> takeToPicture(const SetView& set, const ImageSetOptions& options, S
         lens = [&](glm::dvec2 pixel) { return set.lens.realFromIdeal(to, pixel); };
     STX_TRY(stored.depth, depthSeenBy(to, lens, stored.depth, from, job));
     step.changed(static_cast<std::int64_t>(stored.depth.count()));
-    if (!anyPoint(stored.depth))
-        return fail(ErrorCode::invalidInput,
-                    "nothing of it is in the picture of the colour camera; see --depth-intrinsics "
-                    "and --depth-to-colour");
-    return {};
+    return needDepth(stored.depth, showsNothing,
+                     "nothing of it is in the picture of the colour camera; see --depth-intrinsics "
+                     "and --depth-to-colour");
 }
 
 /// The steps of refining on the pixels of the picture, as the set needs them.
 Result<void> repair(const SetView& set, const ImageSetOptions& options, StoredView& stored,
-                    RefineReport& report, Job& job) {
+                    RefineReport& report, bool& showsNothing, Job& job) {
     const auto does = [&](RefineStep step, bool known) {
         return options.refine.atImport(step, known);
     };
@@ -410,11 +417,11 @@ Result<void> repair(const SetView& set, const ImageSetOptions& options, StoredVi
         if (dropped > 0)
             job.note(fmt::format("view '{}': {} mixed pixels at depth edges are dropped ({:.2g} %)",
                                  set.name, dropped, share(dropped)));
-        if (!anyPoint(stored.depth))
-            return failAt(
-                fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
-                "all of its pixels look like noise at depth edges; keep them, if they are "
-                "not");
+        STX_CHECK(within(
+            fmt::format("'{}'", set.depth.name),
+            needDepth(stored.depth, showsNothing,
+                      "all of its pixels look like noise at depth edges; keep them, if they are "
+                      "not")));
     }
     const Texture& picture = stored.texture;
     if (stored.depth.width() != picture.width()) {
@@ -539,13 +546,13 @@ Result<void> undoLens(const SetView& set, const Camera& camera, StoredView& stor
 }  // namespace
 
 Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSetOptions& options,
-                                               RefineReport& report, Job& job) {
+                                               RefineReport& report, bool& showsNothing, Job& job) {
     STX_CHECK(job.checkCancelled());
     STX_TRY(StoredView stored, readImages(set, options, job));
     NoDepth noDepth = NoDepth::empty;
     if (set.depthCamera)
         STX_CHECK(within(fmt::format("'{}'", set.depth.name),
-                         takeToPicture(set, options, stored, noDepth, report, job)));
+                         takeToPicture(set, options, stored, noDepth, report, showsNothing, job)));
     const int tw = stored.texture.width(), th = stored.texture.height();
     const int dw = stored.depth.width(), dh = stored.depth.height();
     STX_TRY(Camera camera, cameraOfSize(set, tw, th));
@@ -557,9 +564,9 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
                          toDistances(set, options, ofDepth, stored, noDepth, report, job)));
         if (!raise) camera = ofDepth;
     }
-    STX_CHECK(within(fmt::format("'{}'", set.depth.name), needDepth(stored.depth)));
+    STX_CHECK(within(fmt::format("'{}'", set.depth.name), needDepth(stored.depth, showsNothing)));
 
-    STX_CHECK(repair(set, options, stored, report, job));
+    STX_CHECK(repair(set, options, stored, report, showsNothing, job));
 
     std::vector<ReferenceView> views;
     if (set.panorama) {
@@ -574,7 +581,8 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
                            std::move(texture), std::move(depth), true, noDepth, options, job));
             if (anyPoint(view.depth)) views.push_back(std::move(view));
         }
-        if (views.empty())
+        showsNothing = views.empty();
+        if (showsNothing)
             return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
                           "no cube face of the panorama has a valid depth");
         return views;
@@ -582,9 +590,10 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
     if (!set.lens.ideal()) STX_CHECK(undoLens(set, camera, stored, job));
     STX_TRY(auto view, finish(set, set.name, camera, std::move(stored.texture),
                               std::move(stored.depth), stored.alpha, noDepth, options, job));
-    if (!anyPoint(view.depth))
-        return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
-                      "every pixel with a valid depth is transparent or outside the picture");
+    STX_CHECK(
+        within(fmt::format("'{}'", set.depth.name),
+               needDepth(view.depth, showsNothing,
+                         "every pixel with a valid depth is transparent or outside the picture")));
     views.push_back(std::move(view));
     return views;
 }

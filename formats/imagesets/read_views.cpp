@@ -100,9 +100,9 @@ Result<void> prepareToRead(SetDescription& set, const std::string& where,
 }
 
 Result<std::vector<ReferenceView>> loadOne(const SetView& view, const ImageSetOptions& options,
-                                           RefineReport& report, Job& job) {
+                                           RefineReport& report, bool& showsNothing, Job& job) {
     try {
-        STX_TRY(auto views, loadSetView(view, options, report, job));
+        STX_TRY(auto views, loadSetView(view, options, report, showsNothing, job));
         if (view.absent) std::ranges::for_each(views, makeUnknown);
         return views;
     } catch (const std::bad_alloc&) {
@@ -110,12 +110,14 @@ Result<std::vector<ReferenceView>> loadOne(const SetView& view, const ImageSetOp
     }
 }
 
-Result<RefineReport> loadEach(
+Result<LoadedViews> loadEach(
     const SetDescription& set, const std::string& where, const ImageSetOptions& options,
     std::size_t atOnce, Job& job, std::optional<std::size_t>* failing,
     const std::function<Result<void>(std::size_t, std::vector<ReferenceView>)>& take) {
     const std::size_t count = set.views.size();
+    const bool needAll = failing || options.strict || set.frames > 1;
     std::vector<Result<void>> loaded(count);
+    std::vector<char> showNothing(count);
     // Notes and reports in the order of the views, whichever is ready first.
     std::vector<RefineReport> reports(count);
     std::vector<Job> jobs(count);
@@ -129,22 +131,40 @@ Result<RefineReport> loadEach(
                 const auto at = static_cast<std::size_t>(i);
                 if (failed) return;
                 loaded[at] = [&]() -> Result<void> {
-                    STX_TRY(auto views, loadOne(set.views[at], options, reports[at], jobs[at]));
-                    return take(at, std::move(views));
+                    bool nothing = false;
+                    auto views = loadOne(set.views[at], options, reports[at], nothing, jobs[at]);
+                    showNothing[at] = nothing && !needAll;
+                    if (!views) return tl::unexpected(std::move(views.error()));
+                    return take(at, *std::move(views));
                 }();
-                if (!loaded[at]) failed = true;
+                if (!loaded[at] && !showNothing[at]) failed = true;
                 job.progress(++done, static_cast<std::int64_t>(count), "reading views");
             });
     }
     for (Job& own : jobs) own.passNotesOn();
+    LoadedViews out;
     for (std::size_t i = 0; i < count; ++i) {
         if (loaded[i]) continue;
+        if (showNothing[i]) {
+            if (out.showNothing.empty()) out.why = loaded[i].error();
+            out.showNothing.push_back(i);
+            if (out.showNothing.size() < count) continue;
+        }
         if (failing) *failing = i;
-        return tl::unexpected(loaded[i].error().at(where));
+        return tl::unexpected((showNothing[i] ? out.why : loaded[i].error()).at(where));
     }
-    RefineReport report;
-    for (const RefineReport& ofView : reports) report.add(ofView);
-    return report;
+    for (const RefineReport& ofView : reports) out.report.add(ofView);
+    return out;
+}
+
+void leaveOut(const LoadedViews& loaded, SetDescription& set, Job& job) {
+    const std::size_t all = set.views.size(), count = loaded.showNothing.size();
+    if (count == 0) return;
+    for (std::size_t i = count; i-- > 0;)
+        set.views.erase(set.views.begin() + static_cast<std::ptrdiff_t>(loaded.showNothing[i]));
+    job.note(
+        fmt::format("{} of {} views {} left out, as no pixel has a usable depth; the first: {}",
+                    count, all, count == 1 ? "is" : "are", loaded.why.text()));
 }
 
 void makeNamesUnique(std::vector<ReferenceView>& views) {
@@ -233,12 +253,13 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
                    fmt::format("{} views (take each N-th with --every N)", set.views.size()))));
 
     std::vector<std::vector<ReferenceView>> loaded(set.views.size());
-    STX_TRY(RefineReport report,
+    STX_TRY(LoadedViews all,
             loadEach(set, where, options, set.views.size(), job, failing,
                      [&](std::size_t i, std::vector<ReferenceView> views) -> Result<void> {
                          loaded[i] = std::move(views);
                          return {};
                      }));
+    leaveOut(all, set, job);
     Bundle bundle;
     bundle.title = std::move(set.title);
     for (std::vector<ReferenceView>& views : loaded)
@@ -255,14 +276,14 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
     });
     bundle.bounds = boundsTogether(each);
     const glm::dvec3 subtracted = findOrigin(bundle, set, job);
-    STX_CHECK(attendToPoses(bundle, options, each, subtracted, report, job));
+    STX_CHECK(attendToPoses(bundle, options, each, subtracted, all.report, job));
     if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));
     if (set.photo && options.photo.behindPercent > 0) {
         const BehindSettings settings{options.photo.behindPercent};
         STX_TRY(const AddedBehind added, within(where, addBehind(bundle, settings, job)));
         job.note(added.note(settings) + "; --behind none leaves it out");
     }
-    if (options.refined) options.refined(report);
+    if (options.refined) options.refined(all.report);
     return bundle;
 }
 

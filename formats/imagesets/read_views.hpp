@@ -48,13 +48,25 @@ namespace stx::imagesets {
 /// memory does not do.
 [[nodiscard]] Result<std::vector<ReferenceView>> loadOne(const SetView& view,
                                                          const ImageSetOptions& options,
-                                                         RefineReport& report, Job& job);
+                                                         RefineReport& report, bool& showsNothing,
+                                                         Job& job);
+/// What loading all views gives beside them.
+struct LoadedViews {
+    RefineReport report;
+    /// The views of which no pixel has a valid depth, ascending, and why of the first.
+    std::vector<std::size_t> showNothing;
+    Error why;
+};
 /// Loads all views, several at a time, and calls `take` with those of each, from any thread. Notes,
-/// and the errors of the first that fails, come in the order of the views. Gives what was refined.
-[[nodiscard]] Result<RefineReport> loadEach(
+/// and the errors of the first that fails, come in the order of the views. Views that show nothing
+/// are errors, too, where all do, or `failing` or ImageSetOptions::strict is given, or the set is a
+/// frame of several, which have the same cameras.
+[[nodiscard]] Result<LoadedViews> loadEach(
     const SetDescription& set, const std::string& where, const ImageSetOptions& options,
     std::size_t atOnce, Job& job, std::optional<std::size_t>* failing,
     const std::function<Result<void>(std::size_t index, std::vector<ReferenceView> views)>& take);
+/// Takes the views that show nothing out of the set, and says so.
+void leaveOut(const LoadedViews& loaded, SetDescription& set, Job& job);
 /// Names become part and file names: each is there once.
 void makeNamesUnique(std::vector<ReferenceView>& views);
 /// Colours of 8 bits become floats, of which they come back.

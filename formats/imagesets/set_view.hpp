@@ -128,10 +128,11 @@ struct SetDescription {
 
 /// Reads the images of one view and does what is common to all kinds: sizes, lens, mixed pixels,
 /// coverage, planes. A panorama gives its cube faces, others one view. `report` gets what the steps
-/// of refining did.
+/// of refining did. `showsNothing` becomes true where the error is that no pixel has a valid depth.
 [[nodiscard]] Result<std::vector<ReferenceView>> loadSetView(const SetView& set,
                                                              const ImageSetOptions& options,
-                                                             RefineReport& report, Job& job);
+                                                             RefineReport& report,
+                                                             bool& showsNothing, Job& job);
 
 /// Distances that are floats in scene units: NaN, 0 and negative values (not known), infinity and
 /// huge values (1e9 and more: nothing is there) are none.

@@ -83,7 +83,8 @@ class SetViews : public ViewTable, public ViewsLookedAt {
         quiet.workFor(job);
         if (quiet.limits.keepDamaged) quiet.limits.keepDamaged = [](const std::string&) {};
         RefineReport report;
-        auto loaded = loadOne(set_.views[index], options_, report, quiet);
+        bool nothing = false;
+        auto loaded = loadOne(set_.views[index], options_, report, nothing, quiet);
         STX_CHECK(job.checkCancelled());
         STX_CHECK(within(where_, looked_.files[index].check()));
         if (!loaded) return tl::unexpected(loaded.error().at(where_));
@@ -184,7 +185,15 @@ Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::s
         return {};
     };
     STX_TRY(const std::size_t atOnce, within(where, viewsAtOnce(set, job.limits)));
-    STX_TRY(RefineReport report, loadEach(set, where, options, atOnce, job, failing, look));
+    Job first;
+    first.workFor(job);
+    STX_TRY(LoadedViews loaded, loadEach(set, where, options, atOnce, first, failing, look));
+    if (!loaded.showNothing.empty()) {
+        // All that was found has their numbers: the others are looked at again.
+        leaveOut(loaded, set, job);
+        return tableOfViews(std::move(set), where, options, held, job, failing, looked.said);
+    }
+    first.passNotesOn();
     makeNamesUnique(headers.views);
     looked.linear = std::ranges::any_of(looked.kinds, &ViewImageKinds::linear);
     for (ViewImageKinds& kinds : looked.kinds) kinds.linear = looked.linear;
@@ -197,12 +206,12 @@ Result<std::unique_ptr<ViewTable>> tableOfViews(SetDescription set, const std::s
         looked.posesAsked = when == AlignPoses::asked;
         for (std::size_t i = 0; i < count; ++i)
             samples[i].header.camera.position = headers.views[i].camera.position;
-        STX_CHECK(
-            alignCameras(headers, std::move(samples), *when, bounds, subtracted, report, job));
+        STX_CHECK(alignCameras(headers, std::move(samples), *when, bounds, subtracted,
+                               loaded.report, job));
     }
     if (looked.linear || subtracted != glm::dvec3(0.0) || posesWereAligned(headers))
         looked.points.clear();
-    if (options.refined) options.refined(report);
+    if (options.refined) options.refined(loaded.report);
     return std::make_unique<SetViews>(std::move(headers), std::move(set), where, options,
                                       std::move(looked));
 }

@@ -1,6 +1,7 @@
 // A recording of a thousand images from which one is missing is still a recording.
 
 #include "formats/imagesets/export.hpp"
+#include "formats/imagesets/set_views.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
 using namespace stx;
@@ -76,6 +77,60 @@ TEST(MissingFiles, OfRecordingsLeaveTheirViewOut) {
     expectTwoOfThree(tum.path(), "0.png");
     std::filesystem::remove(scenes / "frame-000002.depth.png");
     expectTwoOfThree(scenes.path(), "frame-000002.depth.png");
+}
+
+/// Writes a set of three views, and takes the depth of all pixels of some away.
+std::filesystem::path writeSetWithDarkViews(const TemporaryFolder& folder,
+                                            std::initializer_list<int> dark) {
+    Bundle bundle;
+    bundle.views = roomViews(3);
+    Job job;
+    auto set = folder / "set";
+    EXPECT_TRUE(exportViews(*viewsOf(bundle), set, {}, job));
+    for (const int i : dark)
+        writeExr(set / fmt::format("depth/v{}.exr", i), {{"Z", Image<float>(96, 64, 0.0f)}});
+    return set;
+}
+
+TEST(NoDepthAtAll, LeavesTheViewOut) {
+    TemporaryFolder folder;
+    const auto set = writeSetWithDarkViews(folder, {1});
+    const std::string note =
+        "1 of 3 views is left out, as no pixel has a usable depth; the first: ";
+    ImageSetOptions options;
+    Job job;
+    const auto read = readImageSet(set, options, job);
+    ASSERT_TRUE(read) << read.error().text();
+    ASSERT_EQ(read->views.size(), 2u);
+    EXPECT_EQ(read->views[1].name, "v2");
+    const auto notes = job.takeNotes();
+    EXPECT_TRUE(std::ranges::any_of(notes, [&](const std::string& n) {
+        return n.starts_with(note) && n.find("v1.exr") != std::string::npos;
+    })) << fmt::format("{}", fmt::join(notes, "\n"));
+
+    // As a table whose views are read when they are asked for.
+    const auto table = openSetViews(set, options, job, 0);
+    ASSERT_TRUE(table) << table.error().text();
+    ASSERT_EQ((*table)->count(), 2u);
+    EXPECT_EQ((*table)->about().views[1].name, "v2");
+    for (std::size_t i = 0; i < 2; ++i) {
+        const auto view = (*table)->view(i, job);
+        ASSERT_TRUE(view) << view.error().text();
+        EXPECT_TRUE((*view)->depth == read->views[i].depth);
+    }
+    const auto ofTable = job.takeNotes();
+    EXPECT_TRUE(
+        std::ranges::any_of(ofTable, [&](const std::string& n) { return n.starts_with(note); }));
+
+    options.strict = true;
+    expectError(readImageSet(set, options, job), {"v1.exr", "valid depth"});
+}
+
+TEST(NoDepthAtAll, OfAllViewsIsAnError) {
+    TemporaryFolder folder;
+    const auto set = writeSetWithDarkViews(folder, {0, 1, 2});
+    Job job;
+    expectError(readImageSet(set, {}, job), {"v0.exr", "valid depth"});
 }
 
 }  // namespace
