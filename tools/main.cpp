@@ -4,6 +4,7 @@
 #include <csignal>
 #include <cstdio>
 
+#include "formats/files/named_files.hpp"
 #include "lib/base/parallel.hpp"
 #include "tools/commands.hpp"
 #include "tools/standard_streams.hpp"
@@ -56,6 +57,7 @@ int main(int argc, char** argv) {
     // images stays with the program: a fifth of its peak when it draws.
     mallopt(M_MMAP_THRESHOLD, 256 << 10);
     stx::tools::openClosedStreams();
+    stx::guardNamedFiles();
     // A reader that went away is an error of writing, not the end.
     std::signal(SIGPIPE, SIG_IGN);
     const int code = stx::tools::mainProgram(argc, argv);

@@ -14,6 +14,7 @@
 #include <set>
 #include <system_error>
 
+#include "formats/files/named_files.hpp"
 #include "formats/files/shown_name.hpp"
 #include "formats/files/temporaries.hpp"
 
@@ -207,6 +208,7 @@ Result<OutputFile> OutputFile::create(const fs::path& target, Options options) {
         return OutputFile(std::move(impl));
     }
     if (exists && options.noClobber) return failExists(target);
+    STX_CHECK(checkIsNotNamed(target));
     STX_TRY(impl->real, throughLinks(target));
     if (exists && ::access(impl->real.c_str(), W_OK) != 0) return failIo("write", target, errno);
 
@@ -513,10 +515,7 @@ std::optional<fs::path> plainFile(const std::string& base, std::string_view name
     }
 }
 
-}  // namespace
-
-Result<fs::path> resolveInside(const fs::path& folder, std::string_view name,
-                               const Limits& limits) {
+Result<fs::path> findInside(const fs::path& folder, std::string_view name, const Limits& limits) {
     const auto refuse = [&](std::string_view why) {
         return fail(ErrorCode::invalidInput,
                     "the name '{}' {}; only files in the folder of the file that names them are "
@@ -550,6 +549,15 @@ Result<fs::path> resolveInside(const fs::path& folder, std::string_view name,
         return refuse("leads out of its folder by a link");
     if (!fs::is_regular_file(real, ec)) return refuse("is not a regular file");
     return joined;
+}
+
+}  // namespace
+
+Result<fs::path> resolveInside(const fs::path& folder, std::string_view name,
+                               const Limits& limits) {
+    auto file = findInside(folder, name, limits);
+    if (file) rememberNamedFile(*file);
+    return file;
 }
 
 }  // namespace stx
