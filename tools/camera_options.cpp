@@ -220,7 +220,7 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
         std::vector<NovelCamera> out;
         for (auto& c : cameras) {
             c.camera.position -= context.origin;
-            if (!o.aligned && !c.aligned) c.camera = alignedAmong(c.camera, context.moved);
+            if (!o.aligned && !c.aligned) c.camera = context.moved.aligned(c.camera);
             out.push_back({inPicture(c.camera, size), c.time});
         }
         return out;

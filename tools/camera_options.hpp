@@ -53,11 +53,10 @@ struct SwayPose {
 
 /// What the cameras are made for: the object and its reference views.
 struct CameraContext {
-    Bounds bounds;              ///< of the object
-    glm::dvec3 origin{0.0};     ///< what bounds and views count from; options are in the world
-    std::vector<Camera> views;  ///< of the reference views; empty for a mesh
-    std::vector<MovedCamera> moved =
-        {};                             ///< the same, with how refining moved them; empty: of none
+    Bounds bounds;                 ///< of the object
+    glm::dvec3 origin{0.0};        ///< what bounds and views count from; options are in the world
+    std::vector<Camera> views;     ///< of the reference views; empty for a mesh
+    MovesOfNeighbours moved = {};  ///< how refining moved them
     std::optional<glm::dvec3> up = {};  ///< of a cloud of splats: SplatCloud::up
     std::optional<SwayPose> sway = {};  ///< where --sway is given
 };

@@ -196,8 +196,10 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
     noteUnused(scene.model, o, command, program);
     const auto addViews = [&](const auto& seen) -> Result<void> {
         for (const auto& v : seen.views) scene.context.views.push_back(v.camera);
+        std::vector<MovedCamera> moved;
         for (const auto& v : seen.views)
-            if (!v.background) scene.context.moved.push_back(MovedCamera::of(v));
+            if (!v.background) moved.push_back(MovedCamera::of(v));
+        scene.context.moved = MovesOfNeighbours(std::move(moved));
         scene.points = scene.table ? pointsOf(scene.summaries) : seen.pointCount();
         scene.environment = settings.ownEnvironment && seen.environment;
         if (sways) STX_SET(scene.context.sway, swayPose(o.camera, seen));

@@ -146,7 +146,7 @@ Camera alignedCamera(const Model& model, const Camera& camera) {
     };
     if (const auto* bundle = std::get_if<Bundle>(&model)) add(*bundle);
     if (const auto* atlas = std::get_if<Atlas>(&model)) add(*atlas);
-    return alignedAmong(camera, views);
+    return MovesOfNeighbours(std::move(views)).aligned(camera);
 }
 
 Bounds boundsOf(const Model& model) {

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <span>
+#include <cstddef>
+#include <vector>
 
 #include "lib/model/reference_view.hpp"
 
@@ -22,12 +23,32 @@ struct MovedCamera {
 
     [[nodiscard]] static MovedCamera of(const ViewHeader& view);
 };
-/// A camera that was given beside those of the views, as a file of cameras of the same recording
-/// has it, moved as those near it were: what it shows is seen from where it was taken. Errors of
-/// trackers drift, so that cameras near each other share them: the mean of their moves, weighted by
-/// one over the square of how far they are apart (the angle between the directions they look in,
-/// and what their distance covers of what they show), as Shepard (1968) interpolates. A
-/// camera given as a view's moves as that view did. Where no view moved it stays, to the bit.
-[[nodiscard]] Camera alignedAmong(const Camera& camera, std::span<const MovedCamera> views);
+/// Moves cameras that were given beside those of the views, as a file of cameras of the same
+/// recording has them, as the views near them moved: what they show is seen from where it was
+/// taken. Errors of trackers drift, so that cameras near each other share them: the mean of their
+/// moves, weighted by one over the square of how far they are apart (the angle between the
+/// directions they look in, and what their distance covers of what they show), as Shepard (1968)
+/// interpolates. Errors that each camera has by itself say nothing of another's: the mean counts by
+/// the share of the views' own moves that their neighbours' tell, each view left out in turn. A
+/// camera given as a view's moves as that view did. Where no view moved all stay, to the bit.
+class MovesOfNeighbours {
+  public:
+    MovesOfNeighbours() = default;
+    explicit MovesOfNeighbours(std::vector<MovedCamera> views);
+    [[nodiscard]] Camera aligned(const Camera& camera) const;
+    /// How much of the views' moves their neighbours tell, 0 to 1.
+    [[nodiscard]] double share() const { return share_; }
+
+  private:
+    struct Mean {
+        glm::dvec3 shift{0.0}, turn{0.0};
+        double nearest = 0;  ///< how far the nearest view is apart
+    };
+    [[nodiscard]] Mean meanFor(const Camera& camera, std::size_t without) const;
+    std::vector<MovedCamera> views_;
+    bool still_ = true;  ///< no view moved
+    double share_ = 1;
+    double usualGap_ = 0;  ///< from a view to the nearest other, the median
+};
 
 }  // namespace stx

@@ -178,7 +178,8 @@ Outcome aligningIsWorse(Pictures& pictures) {
     if (done.views == 0) return std::nullopt;
     std::vector<MovedCamera> views;
     for (const ReferenceView& view : aligned.views) views.push_back(MovedCamera::of(view));
-    STX_TRY(const Frame after, drawBundle(aligned, alignedAmong(given, views), recorded.how));
+    STX_TRY(const Frame after,
+            drawBundle(aligned, MovesOfNeighbours(views).aligned(given), recorded.how));
     STX_TRY(const Frame before, drawBundle(recorded.bundle, given, recorded.how));
     const double a = pictures.psnr(after), b = pictures.psnr(before);
     return Measure{worseBy(a, b), fmt::format("{}, poses off by {:.2f} %: aligned {:.2f} dB, as "

@@ -268,7 +268,7 @@ TEST(SevenScenes, PosesThatDriftedAreAligned) {
             EXPECT_TRUE(frame);
             return *compare(eightBitsOf(*frame), *view.texture.rgba8(), {})->psnrRgb;
         };
-        const double now = psnr(*aligned, alignedAmong(view.camera, moved)),
+        const double now = psnr(*aligned, MovesOfNeighbours(moved).aligned(view.camera)),
                      before = psnr(*given, view.camera);
         std::printf("  %s: %.2f dB of RGB, as given %.2f dB\n", view.name.c_str(), now, before);
         EXPECT_GT(now, before + 0.3);

@@ -1,5 +1,9 @@
 // Cameras that were given beside those of views move as these did.
 
+#include <cmath>
+#include <functional>
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include "lib/registration/camera_moves.hpp"
@@ -32,10 +36,24 @@ std::vector<ViewHeader> movedViews() {
     return views;
 }
 
-std::vector<MovedCamera> among(const std::vector<ViewHeader>& views) {
+MovesOfNeighbours among(const std::vector<ViewHeader>& views) {
     std::vector<MovedCamera> out;
     for (const ViewHeader& view : views) out.push_back(MovedCamera::of(view));
-    return out;
+    return MovesOfNeighbours(std::move(out));
+}
+
+/// Views around the target, each moved as `moves` says.
+std::vector<ViewHeader> viewsAround(int count, const std::function<CameraMove(int)>& moves) {
+    std::vector<ViewHeader> views(static_cast<std::size_t>(count));
+    for (int i = 0; i < count; ++i) {
+        ViewHeader& view = views[static_cast<std::size_t>(i)];
+        const double angle = 6.28 * i / count;
+        view.camera = cameraFrom(kTarget + 3.0 * glm::dvec3(std::sin(angle), 0.2, std::cos(angle)));
+        view.nearPlane = 2;
+        view.farPlane = 4;
+        moveCamera(view, moves(i));
+    }
+    return views;
 }
 
 void expectNear(const Camera& a, const Camera& b, double tolerance) {
@@ -46,25 +64,54 @@ void expectNear(const Camera& a, const Camera& b, double tolerance) {
 TEST(CameraMoves, ACameraGivenAsAViewsIsWhereThatIsNow) {
     const auto views = movedViews();
     for (int i = 0; i < 3; ++i)
-        expectNear(alignedAmong(cameraFrom({0.4 * i, 0.1, 2}), among(views)),
+        expectNear(among(views).aligned(cameraFrom({0.4 * i, 0.1, 2})),
                    views[static_cast<std::size_t>(i)].camera, 1e-7);
 }
 
 TEST(CameraMoves, HalfWayItMovesByAboutTheMean) {
     const auto views = movedViews();
     const Camera given = cameraFrom({0.2, 0.1, 2});
-    const CameraMove move = moveBetween(given, alignedAmong(given, among(views)));
+    const CameraMove move = moveBetween(given, among(views).aligned(given));
     const CameraMove half = someMove(0.01);
     EXPECT_LT(glm::length(move.shift - half.shift), 0.3 * glm::length(half.shift));
     EXPECT_LT(glm::angle(glm::normalize(move.turn * glm::conjugate(half.turn))), 0.003);
+}
+
+TEST(CameraMoves, ErrorsThatEachViewHasByItselfAreNotThoseOfOthers) {
+    std::mt19937 random(5);
+    std::normal_distribution<double> error;
+    const auto views = viewsAround(24, [&](int) {
+        const glm::dvec3 shift(error(random), error(random), error(random));
+        const glm::dvec3 axis(error(random), error(random), error(random));
+        return CameraMove{0.02 * shift,
+                          glm::angleAxis(0.01 * glm::length(axis), glm::normalize(axis))};
+    });
+    const auto moves = among(views);
+    EXPECT_LT(moves.share(), 0.1);
+    const Camera between =
+        cameraFrom(kTarget + 3.0 * glm::dvec3(std::sin(0.13), 0.2, std::cos(0.13)));
+    EXPECT_LT(glm::length(moves.aligned(between).position - between.position), 0.005);
+    // That of a view is where the view is.
+    Camera given = views[3].camera;
+    given.position -= views[3].refined.moved->shift;
+    given.orientation = glm::conjugate(views[3].refined.moved->turn) * given.orientation;
+    expectNear(moves.aligned(given), views[3].camera, 1e-6);
+}
+
+TEST(CameraMoves, DriftIsShared) {
+    const auto views = viewsAround(24, [](int i) {
+        return CameraMove{{0.02 * std::sin(0.26 * i), 0.01, 0.02 * std::cos(0.26 * i)},
+                          glm::angleAxis(0.01 + 0.002 * i, glm::dvec3(0, 1, 0))};
+    });
+    EXPECT_GT(among(views).share(), 0.85);
 }
 
 TEST(CameraMoves, BesideViewsThatStayedACameraStays) {
     auto views = movedViews();
     for (ViewHeader& view : views) view.refined.moved.reset();
     const Camera given = cameraFrom({0.1, 0.1, 2});
-    EXPECT_EQ(alignedAmong(given, among(views)), given);
-    EXPECT_EQ(alignedAmong(given, {}), given);
+    EXPECT_EQ(among(views).aligned(given), given);
+    EXPECT_EQ(MovesOfNeighbours().aligned(given), given);
 }
 
 TEST(CameraMoves, OneAfterTheOtherAreOneMove) {
