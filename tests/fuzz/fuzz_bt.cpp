@@ -19,7 +19,10 @@ using namespace stx::mpeg4;
 static bool mayRename(std::string_view text) {
     for (auto at = text.find("DEF"); at != text.npos; at = text.find("DEF", at + 3)) {
         const auto name = text.find_first_not_of(" \t\r\n,", at + 3);
-        if (name != text.npos && std::strchr("+-0123456789", text[name])) return true;
+        if (name == text.npos) continue;
+        if (std::strchr("-0123456789", text[name])) return true;
+        const auto end = std::min(text.find_first_of(" \t\r\n,{[", name), text.size());
+        if (text.substr(name, end - name).find_first_of("+.") != text.npos) return true;
     }
     return std::ranges::any_of(text, [](char c) {
         return std::ispunct(static_cast<unsigned char>(c))
