@@ -28,10 +28,22 @@ glm::dvec3 sightOf(const Camera& camera, glm::dvec3 point) {
     return camera.orthographic ? camera.forward() : glm::normalize(point - camera.position);
 }
 
+/// How far apart the samples of a view are on the surface that it sees at a pixel, which it may see
+/// from aside; infinity where no neighbour is on that surface.
+double stepAt(const PageSet& set, std::size_t view, int u, int v) {
+    const double found = set.depth(view, u, v);
+    // Of the two sides of an axis one may be beyond an edge.
+    const auto rise = [&](int i, int j) {
+        return std::min(std::abs(set.depth(view, u + i, v + j) - found),
+                        std::abs(set.depth(view, u - i, v - j) - found));
+    };
+    return spacingAt(set.views()[view].camera, found) + std::max(rise(1, 0), rise(0, 1));
+}
+
 /// Whether a view shows the surface of a point, which another sees along `sight` with samples
-/// `spacing` apart, as finely in every direction.
+/// `step` apart, as finely in every direction.
 bool showsFinely(const PageSet& set, std::size_t view, glm::dvec3 point, glm::dvec3 sight,
-                 double spacing) {
+                 double step) {
     const Camera& camera = set.views()[view].camera;
     const glm::dvec3 inCamera = glm::conjugate(camera.orientation) * (point - camera.position);
     // From the other side a thin sheet looks otherwise.
@@ -42,19 +54,18 @@ bool showsFinely(const PageSet& set, std::size_t view, glm::dvec3 point, glm::dv
     const PageRectangle* r = set.find(view, u, v);
     if (!r || set.pages()[r->page].texture->alpha(r->texel(u, v)) < 1.0f) return false;
     const double found = set.depth(view, u, v);
-    // Of the two sides of an axis one may be beyond an edge.
-    const auto rise = [&](int i, int j) {
-        return std::min(std::abs(set.depth(view, u + i, v + j) - found),
-                        std::abs(set.depth(view, u - i, v - j) - found));
-    };
-    const double step = spacingAt(camera, found) + std::max(rise(1, 0), rise(0, 1));
-    return std::abs(found - pixel.z) <= kShownDepth * pixel.z + step && step <= spacing;
+    const double own = stepAt(set, view, u, v);
+    return std::abs(found - pixel.z) <= kShownDepth * pixel.z + own && own <= step;
 }
 
 }  // namespace
 
 bool isClearlyFiner(const ViewHeader& view, const ViewHeader& than) {
-    return kFiner * spacingAt(view.camera, view.farPlane) <= spacingAt(than.camera, than.nearPlane);
+    const Camera &fine = view.camera, &coarse = than.camera;
+    // From the same place it is as many times as fine, near and far.
+    const bool alike = fine.orthographic == coarse.orthographic &&
+                       kFiner * spacingAt(fine, 1.0) <= spacingAt(coarse, 1.0);
+    return alike || kFiner * spacingAt(fine, view.farPlane) <= spacingAt(coarse, than.nearPlane);
 }
 
 PageSet PageSet::withoutCoarse(std::int64_t& points) const {
@@ -81,9 +92,10 @@ PageSet PageSet::withoutCoarse(std::int64_t& points) const {
                     const glm::dvec3 point =
                         camera.position +
                         camera.orientation * camera.unproject(x + 0.5, y + 0.5, z);
+                    const double climbs = stepAt(*this, view, x, y);
+                    const double step = std::isfinite(climbs) ? climbs : spacingAt(camera, z);
                     needless.at(x, y) = std::ranges::any_of(finer, [&](std::size_t k) {
-                        return showsFinely(*this, k, point, sightOf(camera, point),
-                                           spacingAt(camera, z));
+                        return showsFinely(*this, k, point, sightOf(camera, point), step);
                     });
                     if (!needless.at(x, y)) all = false;
                 }
