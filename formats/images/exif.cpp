@@ -37,8 +37,10 @@ ExifNotes notesOf(ByteSpan exif) {
     exif_data_unset_option(data.get(), EXIF_DATA_OPTION_FOLLOW_SPECIFICATION);
     exif_data_load_data(data.get(), reinterpret_cast<const unsigned char*>(exif.data()),
                         static_cast<unsigned>(exif.size()));
-    if (const auto o = numberOf(data.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION); o >= 1 && o <= 8)
+    if (const auto o = numberOf(data.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION); o >= 1 && o <= 8) {
         notes.orientation = static_cast<int>(o);
+        notes.oriented = true;
+    }
     const auto focal = numberOf(data.get(), EXIF_IFD_EXIF, EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
     if (focal < 10000) notes.focal35 = focal;
     return notes;
