@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "formats/files/byte_io.hpp"
+#include "formats/images/images.hpp"
 
 namespace stx {
 namespace {
@@ -90,6 +91,12 @@ ExifNotes readExifTiff(ByteSpan tiff) {
     Bytes exif(header.begin(), header.end());
     exif.insert(exif.end(), tiff.begin(), tiff.end());
     return notesOf(exif);
+}
+
+Result<Image<glm::u8vec4>> decodeUpright(ByteSpan bytes, std::string_view name,
+                                         const Limits& limits) {
+    STX_TRY(auto stored, decodeRgba8(bytes, name, limits));
+    return turnedUpright(std::move(stored), readExif(bytes).orientation);
 }
 
 }  // namespace stx

@@ -38,4 +38,8 @@ template <class T>
     return out;
 }
 
+/// decodeRgba8(), turned as the picture's EXIF says: as viewers show it.
+[[nodiscard]] Result<Image<glm::u8vec4>> decodeUpright(ByteSpan bytes, std::string_view name,
+                                                       const Limits& limits);
+
 }  // namespace stx
