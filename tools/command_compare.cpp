@@ -289,7 +289,8 @@ void addCompare(CommandLine& line, Program& program) {
     Command c =
         line.add("compare",
                  "PSNR, IV-PSNR, SSIM and the worst pixel of two images, sequences or folders; "
-                 "exit code 7 when they differ; by their colours, of 16 bits to their last\n\n"
+                 "exit code 7 when they differ; by their colours, of 16 bits to their last, turned "
+                 "upright as EXIF says\n\n"
                  "  stx compare novel.png truth.png --error-picture error.png\n"
                  "  stx compare a_%04d.png b_%04d.png --format json --min-psnr 40\n"
                  "  stx compare drawn/ truth/ --error-picture errors/   all by their names");

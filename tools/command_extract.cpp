@@ -148,7 +148,8 @@ Result<void> checkOptions(const ExtractOptions& o, const Wanted& w, const Comman
     if (o.cameras == "colmap")
         STX_CHECK(command.refuse({"--colour"},
                                  "does not go with --cameras colmap, whose colour is 8-bit PNG"));
-    if (modelOf(o).jpegQuality == 0) STX_CHECK(command.refuse({"--quality"}, "is of JPEG"));
+    const bool jpeg = w.picture ? w.ending != ".png" : modelOf(o).jpegQuality > 0;
+    if (!jpeg) STX_CHECK(command.refuse({"--quality"}, "is of JPEG"));
     if (!w.picture) STX_CHECK(command.refuse({"--view"}, "is of a picture with depth"));
     if (w.shown || w.picture || w.splats || w.points)
         STX_CHECK(command.refuse({"--cameras", "--depth"},
@@ -263,8 +264,8 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
     if (wanted.picture)
         return extractPicture(
             o.input, o.open, o.output,
-            wanted.as == ExtractAs::pair ? DepthPicture::pair : DepthPicture::sideBySide, o.view,
-            o.time, o.refine, program);
+            wanted.as == ExtractAs::pair ? DepthPicture::pair : DepthPicture::sideBySide,
+            o.quality.value_or(92), o.view, o.time, o.refine, program);
     // As exact as PNG for what is JPEG already, and smaller than to code it again.
     o.open.keepColourFiles = wanted.ending == ".html" && o.colour != "png" && !o.quality;
     if (wanted.shown)

@@ -192,7 +192,8 @@ void addSheet(CommandLine& line, Program& program) {
     Command c = line.add(
         "sheet",
         "A contact sheet to look at: the views of a bundle with colour, depth, normals and splats; "
-        "an atlas with its rectangles; frames over time; or two inputs and their error\n\n"
+        "an atlas with its rectangles; frames over time; or two inputs and their error (pictures "
+        "turned upright as EXIF says)\n\n"
         "  stx sheet model.mp4 -o sheet.png\n"
         "  stx sheet atlas -o atlas.png\n"
         "  stx sheet novel.png truth.png -o error.png\n"

@@ -139,7 +139,7 @@ Result<int> extractShown(const std::string& input, const OpenOptions& open,
 }
 
 Result<int> extractPicture(const std::string& input, const OpenOptions& open,
-                           const std::string& output, DepthPicture kind, int view,
+                           const std::string& output, DepthPicture kind, int jpegQuality, int view,
                            const std::optional<double>& time, const std::string& refine,
                            Program& program) {
     const Stopwatch watch;
@@ -155,7 +155,8 @@ Result<int> extractPicture(const std::string& input, const OpenOptions& open,
                         table->bytesHeld() + table->bytesToMake(number), program.job.limits));
     STX_TRY(const auto read, table->view(number, program.job));
     const ReferenceView& shown = *read;
-    STX_CHECK(exportPicture(shown, output, kind, program.outputOptions(), program.job));
+    STX_CHECK(
+        exportPicture(shown, output, kind, jpegQuality, program.outputOptions(), program.job));
     const std::string what = fmt::format(
         "view {} '{}', {}x{}{}", number, shown.name, shown.depth.width(), shown.depth.height(),
         kind == DepthPicture::pair

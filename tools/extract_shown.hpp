@@ -11,9 +11,11 @@
 namespace stx::tools {
 
 /// `stx extract` into a picture with depth: says what was written and reports it. `view`: as
-/// namedView(). Errors: those of momentOf(), namedView() and exportPicture().
+/// namedView(). `jpegQuality`: as exportPicture(). Errors: those of momentOf(), namedView() and
+/// exportPicture().
 [[nodiscard]] Result<int> extractPicture(const std::string& input, const OpenOptions& open,
-                                         const std::string& output, DepthPicture kind, int view,
+                                         const std::string& output, DepthPicture kind,
+                                         int jpegQuality, int view,
                                          const std::optional<double>& time,
                                          const std::string& refine, Program& program);
 

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "formats/files/byte_io.hpp"
+#include "formats/images/images.hpp"
 
 namespace stx {
 namespace {
@@ -37,8 +38,10 @@ ExifNotes notesOf(ByteSpan exif) {
     exif_data_unset_option(data.get(), EXIF_DATA_OPTION_FOLLOW_SPECIFICATION);
     exif_data_load_data(data.get(), reinterpret_cast<const unsigned char*>(exif.data()),
                         static_cast<unsigned>(exif.size()));
-    if (const auto o = numberOf(data.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION); o >= 1 && o <= 8)
+    if (const auto o = numberOf(data.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION); o >= 1 && o <= 8) {
         notes.orientation = static_cast<int>(o);
+        notes.oriented = true;
+    }
     const auto focal = numberOf(data.get(), EXIF_IFD_EXIF, EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
     if (focal < 10000) notes.focal35 = focal;
     return notes;
@@ -88,6 +91,12 @@ ExifNotes readExifTiff(ByteSpan tiff) {
     Bytes exif(header.begin(), header.end());
     exif.insert(exif.end(), tiff.begin(), tiff.end());
     return notesOf(exif);
+}
+
+Result<Image<glm::u8vec4>> decodeUpright(ByteSpan bytes, std::string_view name,
+                                         const Limits& limits) {
+    STX_TRY(auto stored, decodeRgba8(bytes, name, limits));
+    return turnedUpright(std::move(stored), readExif(bytes).orientation);
 }
 
 }  // namespace stx

@@ -10,6 +10,7 @@ struct ExifNotes {
     /// How to turn the stored picture: 1 = not at all, 3 = by half a turn, 6 = clockwise, 8 =
     /// counter-clockwise, 2, 4, 5 and 7 = these mirrored (EXIF 2.3, tag 274).
     int orientation = 1;
+    bool oriented = false;  ///< the file has that tag
     double focal35 = 0;  ///< focal length of a 36x24 mm camera with the same diagonal, mm; 0 = none
 };
 
@@ -36,5 +37,9 @@ template <class T>
         }
     return out;
 }
+
+/// decodeRgba8(), turned as the picture's EXIF says: as viewers show it.
+[[nodiscard]] Result<Image<glm::u8vec4>> decodeUpright(ByteSpan bytes, std::string_view name,
+                                                       const Limits& limits);
 
 }  // namespace stx

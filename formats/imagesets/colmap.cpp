@@ -16,27 +16,36 @@ namespace {
 struct Model {
     const char* name;
     std::size_t parameters;
+    bool known = true;  ///< it can be undone here
 };
-/// In the order of COLMAP's numbers; those without parameters cannot be undone here.
+/// In the order of COLMAP's numbers.
 constexpr Model kModels[] = {{"SIMPLE_PINHOLE", 3},
                              {"PINHOLE", 4},
                              {"SIMPLE_RADIAL", 4},
                              {"RADIAL", 5},
                              {"OPENCV", 8},
                              {"OPENCV_FISHEYE", 8},
-                             {"FULL_OPENCV", 0},
-                             {"FOV", 0},
+                             {"FULL_OPENCV", 12, false},
+                             {"FOV", 5, false},
                              {"SIMPLE_RADIAL_FISHEYE", 4},
                              {"RADIAL_FISHEYE", 5},
-                             {"THIN_PRISM_FISHEYE", 0}};
+                             {"THIN_PRISM_FISHEYE", 12, false}};
 
-tl::unexpected<Error> unknownModel(const std::string& model, const std::string& where) {
+Error unknownModel(const std::string& model, const std::string& where) {
     return failAt(
-        where, ErrorCode::invalidInput,
-        "the camera model is {}; SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and "
-        "those three with _FISHEYE are known (COLMAP's image_undistorter makes PINHOLE of the "
-        "others)",
-        model);
+               where, ErrorCode::invalidInput,
+               "the camera model is {}; SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and "
+               "those three with _FISHEYE are known (COLMAP's image_undistorter makes PINHOLE of "
+               "the others)",
+               model)
+        .value();
+}
+
+/// A camera that matters only where an image was taken by it.
+ColmapCamera unknownCamera(const std::string& model, const std::string& where) {
+    ColmapCamera camera;
+    camera.unknown = unknownModel(model, where);
+    return camera;
 }
 
 Result<ColmapCamera> cameraOf(const std::string& model, double width, double height,
@@ -118,14 +127,16 @@ Result<ColmapCameras> camerasFromText(std::string_view text, const Limits& limit
             return failAt(line.where(), ErrorCode::invalidInput,
                           "'CAMERA_ID MODEL WIDTH HEIGHT PARAMS...' is expected");
         const std::string model(words[1]);
-        std::size_t parameters = 0;
-        for (const Model& m : kModels)
-            if (model == m.name) parameters = m.parameters;
-        if (parameters == 0) return unknownModel(model.substr(0, 40), line.where());
-        STX_TRY(const auto size, numbersOf(words, 2, 2, line.where()));
-        STX_TRY(const auto p, numbersOf(words, 4, parameters, line.where()));
-        STX_TRY(const auto camera, cameraOf(model, size[0], size[1], p, line.where()));
-        cameras[static_cast<std::uint32_t>(id[0])] = camera;
+        const auto known = std::ranges::find_if(
+            kModels, [&](const Model& m) { return m.known && model == m.name; });
+        auto& camera = cameras[static_cast<std::uint32_t>(id[0])];
+        if (known == std::end(kModels)) {
+            camera = unknownCamera(model.substr(0, 40), line.where());
+        } else {
+            STX_TRY(const auto size, numbersOf(words, 2, 2, line.where()));
+            STX_TRY(const auto p, numbersOf(words, 4, known->parameters, line.where()));
+            STX_TRY(camera, cameraOf(model, size[0], size[1], p, line.where()));
+        }
         STX_CHECK(checkViewCount(cameras.size(), limits, line.where()));
     }
     return cameras;
@@ -143,16 +154,19 @@ Result<ColmapCameras> camerasFromBinary(ByteSpan bytes, const Limits& limits) {
         const auto id = static_cast<std::uint32_t>(in.u(4));
         const std::uint64_t model = in.u(4);
         const std::uint64_t width = in.u(8), height = in.u(8);
-        if (model >= std::size(kModels) || kModels[model].parameters == 0)
-            return unknownModel(
-                model < std::size(kModels) ? kModels[model].name : fmt::format("number {}", model),
-                where);
+        // How long it is is not known either.
+        if (model >= std::size(kModels))
+            return tl::unexpected(unknownModel(fmt::format("number {}", model), where));
+        if (!kModels[model].known && !in.has(8 * kModels[model].parameters))
+            return tl::unexpected(unknownModel(kModels[model].name, where));
         if (!in.has(8 * kModels[model].parameters)) return cutShort(in, "camera", i, count);
         std::vector<double> p(kModels[model].parameters);
         for (double& v : p) v = in.number();
-        STX_TRY(const auto camera, cameraOf(kModels[model].name, static_cast<double>(width),
-                                            static_cast<double>(height), p, where));
-        cameras[id] = camera;
+        if (kModels[model].known)
+            STX_SET(cameras[id], cameraOf(kModels[model].name, static_cast<double>(width),
+                                          static_cast<double>(height), p, where));
+        else
+            cameras[id] = unknownCamera(kModels[model].name, where);
     }
     return cameras;
 }
@@ -270,8 +284,9 @@ Result<Model3d> readModel(const path& given, const Limits& limits) {
         }
         return false;
     };
-    if (!hasModel(folder / "sparse") && !hasModel(folder / "sparse/0") && hasModel(folder)) {
-        // The model's own folder is given: the images are beside it.
+    if (!hasModel(folder / "sparse") && !hasModel(folder / "sparse/0") &&
+        (hasModel(folder) || hasModel(folder / "0"))) {
+        // The model's own folder is given, or sparse/: the images are beside it.
         for (const char* up : {"..", "../.."})
             if (!std::filesystem::is_directory(m.base / "images", ec)) m.base = folder / up;
         m.base = m.base.lexically_normal();
@@ -298,6 +313,9 @@ Result<SetView> viewOf(const Model3d& m, const ColmapImage& image, const std::st
                       "it was taken by camera {}, which the model's cameras do not have",
                       image.camera);
     const ColmapCamera& c = found->second;
+    if (c.unknown)
+        return within(inQuotes(m.file("cameras").string()),
+                      Result<SetView>(tl::unexpected(*c.unknown)));
     SetView view;
     view.name = path(image.name).replace_extension().generic_string();
     STX_TRY(const glm::dmat3 rotation, rotationFromQuaternion(image.rotation, place));

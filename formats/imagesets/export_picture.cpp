@@ -14,7 +14,7 @@ namespace stx {
 namespace {
 
 /// Of JPEG. Depth has the best: rings beside its edges would be surfaces that are not there.
-constexpr int kColourQuality = 92, kDepthQuality = 100;
+constexpr int kDepthQuality = 100;
 
 /// A picture of 8 bits with one or three channels.
 struct Picture {
@@ -83,7 +83,8 @@ std::filesystem::path depthFileOf(const std::filesystem::path& picture) {
 }
 
 Result<void> exportPicture(const ReferenceView& view, const std::filesystem::path& path,
-                           DepthPicture kind, OutputFile::Options options, Job& job) {
+                           DepthPicture kind, int jpegQuality, OutputFile::Options options,
+                           Job& job) {
     STX_TRY(const auto range, rangeOf(view));
     const int width = view.depth.width(), height = view.depth.height();
     const bool together = kind == DepthPicture::sideBySide;
@@ -110,7 +111,7 @@ Result<void> exportPicture(const ReferenceView& view, const std::filesystem::pat
         }
     }
     if (!together) STX_CHECK(write(depth, depthFileOf(path), kDepthQuality, options));
-    return write(colour, path, kColourQuality, options);
+    return write(colour, path, jpegQuality, options);
 }
 
 }  // namespace stx

@@ -25,12 +25,6 @@ namespace {
 /// A smaller share of a picture that undoing its lens cuts away is not told.
 constexpr double kCutWorthTelling = 0.005;
 
-/// The two images have the same shape but for the rounding of one pixel.
-bool sameShape(int w1, int h1, int w2, int h2) {
-    const double difference = std::abs(static_cast<double>(w1) * h2 - static_cast<double>(w2) * h1);
-    return difference <= std::max({w1, h1, w2, h2});
-}
-
 /// Fills in a camera that has no size, and errors when sizes disagree.
 Result<Camera> cameraOfSize(const SetView& set, int width, int height) {
     Camera c = set.camera;
@@ -499,7 +493,7 @@ Result<void> matchSizes(const SetView& set, bool raise, StoredView& stored, Came
     const int tw = stored.texture.width(), th = stored.texture.height();
     const int dw = stored.depth.width(), dh = stored.depth.height();
     if (tw == dw && th == dh) return {};
-    if (!set.stretched && !sameShape(tw, th, dw, dh))
+    if (!set.stretched && !sameShape({tw, th}, {dw, dh}))
         return fail(ErrorCode::invalidInput,
                     "'{}' is {}x{} but its depth '{}' is {}x{}; both must match, or have the "
                     "same shape",

@@ -6,6 +6,7 @@
 
 #include "formats/files/messages.hpp"
 #include "formats/files/not_there.hpp"
+#include "formats/images/exif.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/pictures.hpp"
@@ -57,6 +58,8 @@ struct PhotoDepth {
     PhotoDepthCode code;   ///< of integers
     double unit = 0;       ///< scene units of one step, where code does not matter
     bool assumed = false;  ///< its range is a guess
+    int orientation = 1;   ///< of a file of its own: how to turn it, as EXIF counts
+    std::string turned;    ///< what a person should know of that
 };
 
 /// A depth picture beside a photo. A JPEG may have coded its grey as colours, which are then off by
@@ -89,7 +92,11 @@ Result<StoredDepth> readBeside(const PictureSource& source, Job& job) {
 }
 
 Result<StoredDepth> storedDepth(const Photo& photo, const PhotoDepth& depth, Job& job) {
-    if (!depth.source.name.empty()) return readBeside(depth.source, job);
+    if (!depth.source.name.empty()) {
+        STX_TRY(auto beside, readBeside(depth.source, job));
+        beside.values = turnedUpright(std::move(beside.values), depth.orientation);
+        return beside;
+    }
     STX_TRY(auto decoded, photos::decodeDepth(photo, job));
     return StoredDepth{std::move(decoded.values), decoded.bits};
 }
@@ -119,6 +126,30 @@ Result<void> readBesideCode(const path& file, const ImageSetOptions& options, in
     return {};
 }
 
+/// How depth of that size, as it is stored beside the photo, is turned: by its own orientation;
+/// without one as the picture, where only the picture as it is stored has the same shape.
+Result<void> findTurn(const Photo& photo, glm::ivec2 size, PhotoDepth& depth, Job& job) {
+    STX_TRY(const auto bytes, readFile(depth.source.path, job.limits));
+    if (const ExifNotes own = readExif(bytes); own.oriented) {
+        depth.orientation = own.orientation;
+        return {};
+    }
+    if (photo.orientation == 1) return {};
+    const glm::ivec2 upright = photo.uprightSize(photo.colour);
+    const bool sideways = upright != glm::ivec2(photo.colour.width, photo.colour.height);
+    if (!sideways || sameShape(upright, {upright.y, upright.x}))
+        depth.turned = fmt::format(
+            "its depth, '{}', is taken as upright, which its size cannot tell", depth.source.name);
+    else if (!sameShape(size, upright) && sameShape(size, {upright.y, upright.x})) {
+        depth.orientation = photo.orientation;
+        depth.turned = fmt::format(
+            "its depth, '{}', lies as the sensor saw it and is turned as the "
+            "picture is",
+            depth.source.name);
+    }
+    return {};
+}
+
 /// Depth beside the photo, with its code.
 Result<PhotoDepth> besideDepth(const path& file, const ImageSetOptions& options, Photo& photo,
                                Job& job) {
@@ -126,8 +157,12 @@ Result<PhotoDepth> besideDepth(const path& file, const ImageSetOptions& options,
     depth.source.path = file;
     depth.source.name = file.filename().string();
     STX_TRY(const auto stored, readBeside(depth.source, job));
-    photo.depth.width = stored.values.width();
-    photo.depth.height = stored.values.height();
+    STX_CHECK(findTurn(photo, stored.values.size(), depth, job));
+    glm::ivec2 size = stored.values.size();
+    // The photo's own turn is counted on its pictures' sizes.
+    if ((depth.orientation >= 5) != (photo.orientation >= 5)) std::swap(size.x, size.y);
+    photo.depth.width = size.x;
+    photo.depth.height = size.y;
     STX_CHECK(readBesideCode(file, options, stored.bits, depth));
     const bool floats = stored.bits == 32;
     photo.accuracy = floats || depth.unit > 0 ? "absolute" : "relative";
@@ -212,6 +247,7 @@ Camera cameraOfPhoto(const Photo& photo, glm::ivec2 size, const ImageSetOptions&
 /// What a person should know of the depth.
 void noteDepth(const Photo& photo, const PhotoDepth& depth, const ImageSetOptions& options,
                std::vector<std::string>& notes) {
+    if (!depth.turned.empty()) notes.push_back(depth.turned);
     if (depth.assumed)
         notes.emplace_back(
             "its depth has no scale: from nearest to farthest 1 to 4 is assumed, with the median "

@@ -266,6 +266,12 @@ Result<glm::ivec2> imageSizeOf(const PictureSource& source, Job& job) {
     return glm::ivec2(image.width, image.height);
 }
 
+bool sameShape(glm::ivec2 a, glm::ivec2 b) {
+    const double difference =
+        std::abs(static_cast<double>(a.x) * b.y - static_cast<double>(b.x) * a.y);
+    return difference <= std::max({a.x, a.y, b.x, b.y});
+}
+
 Result<Image<float>> parsePfm(ByteSpan bytes, std::string_view name, const Limits& limits) {
     const std::string_view text = textOf(bytes).substr(0, 200);
     const auto complain = [&] {

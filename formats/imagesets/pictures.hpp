@@ -25,6 +25,9 @@ struct StoredDepth {
 /// Width and height, from the header alone where that is possible (PNG, JPEG).
 [[nodiscard]] Result<glm::ivec2> imageSizeOf(const PictureSource& source, Job& job);
 
+/// Two images of these sizes have the same shape but for the rounding of one pixel.
+[[nodiscard]] bool sameShape(glm::ivec2 a, glm::ivec2 b);
+
 /// `PF`/`Pf` files: floats, rows from the bottom, a negative scale for little-endian.
 [[nodiscard]] Result<Image<float>> parsePfm(ByteSpan bytes, std::string_view name,
                                             const Limits& limits);

@@ -170,7 +170,7 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
         if (name.starts_with("calibParams")) return std::string("msr");
     const auto has = [&](const char* name) { return fs::exists(path / name, ec); };
     if (has("sparse/cameras.bin") || has("sparse/cameras.txt") || has("sparse/0/cameras.bin") ||
-        has("sparse/0/cameras.txt") ||
+        has("sparse/0/cameras.txt") || has("0/cameras.bin") || has("0/cameras.txt") ||
         ((has("cameras.bin") || has("cameras.txt")) && (has("images.bin") || has("images.txt"))))
         return std::string("colmap");
     if (has("calib.txt")) return std::string("middlebury");

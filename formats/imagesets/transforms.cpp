@@ -286,9 +286,13 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
             STX_TRY(depth, findText(frames[i], "depth_path", place));
         }
         if (!depth && path(textureFile).extension() == ".exr") depth = textureFile;
-        if (!depth)
-            return failAt(place, ErrorCode::invalidInput,
-                          "'depth_file_path' is missing; each frame needs its depth");
+        if (!depth) {
+            view.missing = failAt(place, ErrorCode::invalidInput,
+                                  "'depth_file_path' is missing; each frame needs its depth")
+                               .value();
+            STX_TRY(view.texture, sourceInside(folder, textureFile, place, job.limits));
+            return {};
+        }
         STX_CHECK(findPictures(folder, textureFile, withImageEnding(folder, *depth), place,
                                job.limits, view));
         STX_TRY(const auto mask, findText(frames[i], "mask_path", place));

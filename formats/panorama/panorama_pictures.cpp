@@ -46,8 +46,7 @@ class PictureFiles final : public PictureSource {
             if (!kept_[at].empty()) return kept_[at];
         }
         STX_TRY(const auto bytes, readFile(files_[at], job_.limits));
-        STX_TRY(auto decoded, decodeRgba8(bytes, files_[at].string(), job_.limits));
-        Rgba8Image upright = turnedUpright(std::move(decoded), notes_[at].orientation);
+        STX_TRY(Rgba8Image upright, decodeUpright(bytes, files_[at].string(), job_.limits));
         constexpr int kLeastSide = 32;
         if (std::min(upright.width(), upright.height()) < kLeastSide)
             return failAt(inQuotes(files_[at].string()), ErrorCode::invalidInput,

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "formats/files/messages.hpp"
+#include "formats/images/exif.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/photos/photo.hpp"
@@ -104,7 +105,7 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
         return picture;
     }
     if (const auto info = probeImage(bytes); info && !(info->format == "png" && info->bits > 8)) {
-        STX_TRY(picture.coded, decodeRgba8(bytes, path.string(), job.limits));
+        STX_TRY(picture.coded, decodeUpright(bytes, path.string(), job.limits));
         return picture;
     }
     STX_TRY(const auto decoded, decodeImage(bytes, path.string(), job.limits));
@@ -126,7 +127,12 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
         decoded.displayWidth > 0 && decoded.displayHeight > 0 &&
         (decoded.originX != 0 || decoded.originY != 0 || decoded.displayWidth != decoded.width ||
          decoded.displayHeight != decoded.height);
-    if (!isPart) return picture;
+    if (!isPart) {
+        const int orientation = readExif(bytes).orientation;
+        if (wanted) floats = turnedUpright(std::move(floats), orientation);
+        picture.coded = turnedUpright(std::move(picture.coded), orientation);
+        return picture;
+    }
     STX_CHECK(
         within(inQuotes(path.string()),
                job.limits.checkAllocation(static_cast<std::uint64_t>(decoded.displayWidth) *

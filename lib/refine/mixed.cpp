@@ -14,6 +14,24 @@ namespace {
 constexpr float kStepOfEdge = 0.025f;
 /// How much larger than the slope of the surfaces beside it a step must be.
 constexpr float kBeyondSlope = 3.0f;
+/// Steps of 1 / distance that differ by less, as a share of the larger, are of one slope. A plane's
+/// are equal; those of a fisheye's picture with a focal length of 60 pixels differ by less up to 75
+/// degrees off its axis.
+constexpr float kSameSlope = 0.25f;
+
+bool sameSlope(float a, float b) {
+    return std::abs(a - b) <= kSameSlope * std::max(std::abs(a), std::abs(b));
+}
+
+/// Whether five samples in a row are of a slope around the third: its steps go on at both sides,
+/// and beyond one of these. Between two surfaces the steps to them may be alike, those beyond are
+/// not.
+bool onSlope(float a2, float a, float z, float b, float b2) {
+    if (!hasPoint(a) || !hasPoint(b)) return false;
+    const float stepA = 1 / z - 1 / a, stepB = 1 / b - 1 / z;
+    return sameSlope(stepA, stepB) && ((hasPoint(a2) && sameSlope(1 / a - 1 / a2, stepA)) ||
+                                       (hasPoint(b2) && sameSlope(1 / b2 - 1 / b, stepB)));
+}
 
 }  // namespace
 
@@ -30,7 +48,7 @@ std::int64_t dropMixedPixels(Image<float>& distances) {
                 const float z = before.at(x, y);
                 if (!hasPoint(z)) continue;
                 const float edge = kStepOfEdge * z;
-                bool mixed = false;
+                bool mixed = false, slope = false;
                 int company = 0;
                 static constexpr int kAxes[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
                 for (const auto& axis : kAxes) {
@@ -44,6 +62,7 @@ std::int64_t dropMixedPixels(Image<float>& distances) {
                         continue;
                     const float a2 = get(x - 2 * axis[0], y - 2 * axis[1]);
                     const float b2 = get(x + 2 * axis[0], y + 2 * axis[1]);
+                    slope |= onSlope(a2, a, z, b, b2);
                     // Without either surface beside it, a steep one is as likely.
                     if (!hasPoint(a2) && !hasPoint(b2)) continue;
                     const float slopeA = hasPoint(a2) ? std::abs(a - a2) : 0.0f;
@@ -51,7 +70,7 @@ std::int64_t dropMixedPixels(Image<float>& distances) {
                     mixed |= std::abs(stepA) > kBeyondSlope * slopeA &&
                              std::abs(stepB) > kBeyondSlope * slopeB;
                 }
-                if (mixed || company == 0) {
+                if (mixed || (company == 0 && !slope)) {
                     distances.at(x, y) = kNoDepth;
                     ++here;
                 }

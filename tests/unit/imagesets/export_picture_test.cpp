@@ -29,7 +29,8 @@ ReferenceView view() {
 TEST(DepthPictures, HaveColourOnTheLeftAndWhiteNearOnTheRight) {
     const TemporaryFolder folder;
     Job job;
-    ASSERT_TRUE(exportPicture(view(), folder / "v_rgbd.png", DepthPicture::sideBySide, {}, job));
+    ASSERT_TRUE(
+        exportPicture(view(), folder / "v_rgbd.png", DepthPicture::sideBySide, 92, {}, job));
     const auto bytes = readFile(folder / "v_rgbd.png", Limits());
     ASSERT_TRUE(bytes);
     const auto picture = decodeRgba8(*bytes, "v", Limits());
@@ -49,7 +50,7 @@ TEST(DepthPictures, HaveColourOnTheLeftAndWhiteNearOnTheRight) {
 TEST(DepthPictures, ArePairsOfOneSize) {
     const TemporaryFolder folder;
     Job job;
-    ASSERT_TRUE(exportPicture(view(), folder / "v.png", DepthPicture::pair, {}, job));
+    ASSERT_TRUE(exportPicture(view(), folder / "v.png", DepthPicture::pair, 92, {}, job));
     EXPECT_EQ(depthFileOf("a/b.c.jpg"), "a/b.c_depth.jpg");
     const auto depth = readFile(folder / "v_depth.png", Limits());
     ASSERT_TRUE(depth);
@@ -66,13 +67,13 @@ TEST(DepthPictures, AreOfViewsWithDepth) {
     Job job;
     ReferenceView none = view();
     none.depth = Image<float>(4, 1, kNoDepth);
-    const auto done = exportPicture(none, folder / "n.png", DepthPicture::pair, {}, job);
+    const auto done = exportPicture(none, folder / "n.png", DepthPicture::pair, 92, {}, job);
     ASSERT_FALSE(done);
     EXPECT_EQ(done.error().code, ErrorCode::invalidInput);
     EXPECT_FALSE(std::filesystem::exists(folder / "n_depth.png"));
     // One distance has no farthest.
     none.depth = Image<float>(4, 1, 2.0f);
-    ASSERT_TRUE(exportPicture(none, folder / "o.png", DepthPicture::pair, {}, job));
+    ASSERT_TRUE(exportPicture(none, folder / "o.png", DepthPicture::pair, 92, {}, job));
 }
 
 }  // namespace

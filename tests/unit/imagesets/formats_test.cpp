@@ -92,6 +92,26 @@ TEST(Colmap, CutShortAndUnknownModelsAreErrors) {
     expectError(readSet(folder.path()), {"cameras.bin", "FULL_OPENCV", "PINHOLE"});
 }
 
+/// A camera by which no image was taken may be of any model; sparse/ is a name of the model, too.
+TEST(Colmap, OnlyCamerasInUseMatter) {
+    const auto views = roomViews(1);
+    TemporaryFolder folder;
+    writeColmap(folder.path(), views, false);
+    const auto file = folder / "sparse/cameras.txt";
+    const auto bytes = readFile(file, {});
+    ASSERT_TRUE(bytes);
+    const std::string text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    writeText(file, text + "\n77 FOV 96 64 80 80 48 32 0.9\n");
+    const auto read = readSet(folder.path(), keepAll());
+    ASSERT_TRUE(read) << read.error().text();
+    expectSame(views[0], read->views[0]);
+    std::filesystem::create_directory(folder / "sparse/0");
+    for (const char* name : {"cameras.txt", "images.txt"})
+        std::filesystem::rename(folder / "sparse" / name, folder / "sparse/0" / name);
+    EXPECT_EQ(recogniseImageSet(folder / "sparse").value_or(""), "colmap");
+    EXPECT_TRUE(readSet(folder / "sparse"));
+}
+
 TEST(Msr, CheckValues) {
     EXPECT_NEAR(imagesets::msrWorldZ(128, 42, 130), 63.3612, 5e-5);
     EXPECT_NEAR(imagesets::msrWorldZ(128, 44, 120), 64.2734, 5e-5);

@@ -45,6 +45,38 @@ TEST(MissingFiles, OfTransformsLeaveTheirViewOut) {
     expectError(readSet(set), {"frames[0]", "v0.png"});
 }
 
+/// Frames that name no depth are left out as those are whose files are missing.
+TEST(MissingFiles, FramesOfTransformsWithoutDepthAreLeftOut) {
+    Bundle bundle;
+    bundle.views = roomViews(3);
+    for (std::size_t i = 0; i < 3; ++i) bundle.views[i].name = fmt::format("v{}", i);
+    TemporaryFolder folder;
+    Job job;
+    const auto set = folder / "set";
+    ASSERT_TRUE(exportViews(*viewsOf(bundle), set, {}, job));
+    const auto bytes = readFile(set / "transforms.json", job.limits);
+    ASSERT_TRUE(bytes);
+    std::string text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    const auto forget = [&] {
+        text.replace(text.find("depth_file_path"), 15, "no_depth_at_all");
+        writeText(set / "transforms.json", text);
+    };
+    forget();
+    const auto read = readImageSet(set, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    EXPECT_EQ(read->views.size(), 2u);
+    EXPECT_TRUE(std::ranges::any_of(job.takeNotes(), [](const std::string& note) {
+        return note.find("1 of 3 views is left out") != std::string::npos &&
+               note.find("depth_file_path") != std::string::npos;
+    }));
+    ImageSetOptions strict;
+    strict.strict = true;
+    expectError(readSet(set, strict), {"frames[0]", "depth_file_path"});
+    forget();
+    forget();
+    expectError(readSet(set), {"frames[0]", "depth_file_path"});
+}
+
 TEST(MissingFiles, OfRecordingsLeaveTheirViewOut) {
     const auto views = roomViews(3);
     TemporaryFolder tum, scenes;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "formats/images/exif.hpp"
+#include "formats/imagesets/summary.hpp"
+#include "formats/photos/photo.hpp"
 #include "tests/made_photos.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
@@ -29,6 +32,61 @@ struct GreyBeside {
     }
     [[nodiscard]] Result<Bundle> read() const { return readSet(folder / "a.png", options); }
 };
+
+/// Codes of 200 in the upper left quarter, 100 elsewhere.
+std::vector<std::uint8_t> quarterCodes(glm::ivec2 size) {
+    std::vector<std::uint8_t> codes;
+    for (int y = 0; y < size.y; ++y)
+        for (int x = 0; x < size.x; ++x)
+            codes.push_back(x < size.x / 2 && y < size.y / 2 ? 200 : 100);
+    return codes;
+}
+
+/// A photo of 96x64 that EXIF turns, with depth beside it.
+struct TurnedBeside {
+    static constexpr int kWidth = 96, kHeight = 64;
+    TemporaryFolder folder;
+    ImageSetOptions options;
+    std::vector<std::string> notes;
+
+    explicit TurnedBeside(int orientation) {
+        writeBytes(folder / "a.jpg", made::withSegments(made::colourJpeg(kWidth, kHeight),
+                                                        {made::exifSegment(orientation, 28)}));
+        options.from = "photo";
+        options.photo.nearIs = NearIs::white;
+        options.depthMin = 2;
+        options.depthMax = 4;
+        options.depthBits = 32;
+        options.refine = *RefineSettings::from("off");
+    }
+    [[nodiscard]] Result<ReferenceView> read() {
+        Job job;
+        auto bundle = readImageSet(folder / "a.jpg", options, job);
+        if (!bundle) return tl::unexpected(bundle.error());
+        notes = job.takeNotes();
+        return std::move(bundle->views[0]);
+    }
+    [[nodiscard]] bool notesSay(std::string_view text) const {
+        return std::ranges::any_of(
+            notes, [&](const std::string& note) { return note.find(text) != std::string::npos; });
+    }
+    /// The size of the depth that stx info shows.
+    [[nodiscard]] glm::ivec2 depthOfInfo() const {
+        Job job;
+        const auto summary = summariseImageSet(folder / "a.jpg", job);
+        return summary && summary->photo ? summary->photo->uprightSize(summary->photo->depth)
+                                         : glm::ivec2(0);
+    }
+};
+
+/// Whether the upper left quarter is near, and no other.
+void expectUpright(const Image<float>& depth) {
+    const int w = depth.width(), h = depth.height();
+    EXPECT_NEAR(depth.at(w / 4, h / 4), 2, 0.05);
+    EXPECT_NEAR(depth.at(3 * w / 4, h / 4), 4, 0.05);
+    EXPECT_NEAR(depth.at(w / 4, 3 * h / 4), 4, 0.05);
+    EXPECT_NEAR(depth.at(3 * w / 4, 3 * h / 4), 4, 0.05);
+}
 
 }  // namespace
 
@@ -104,4 +162,69 @@ TEST(PhotoDepth, OptionsOfDepthBesideAreRefusedWhereTheFileHasIt) {
     options.depthUnit = 0;
     options.photo.nearIs = NearIs::white;
     expectError(readSet(folder / "a.jpg", options), {"a.jpg", "--depth-near", "in the file"});
+}
+
+/// Phones and programs that write pairs may give both files the orientation.
+TEST(PhotoDepth, DepthWithAnOrientationOfItsOwnIsTurnedByIt) {
+    for (const int orientation : {1, 3, 6, 8}) {
+        SCOPED_TRACE(orientation);
+        const int back = orientation == 6 ? 8 : orientation == 8 ? 6 : orientation;
+        TurnedBeside photo(orientation);
+        const bool sideways = orientation >= 5;
+        Image<std::uint8_t> codes(sideways ? 64 : 96, sideways ? 96 : 64);
+        std::ranges::copy(quarterCodes(codes.size()), codes.data());
+        codes = turnedUpright(std::move(codes), back);
+        const auto jpeg = encodeJpeg(codes.width(), codes.height(), 1, codes.data(), 95);
+        ASSERT_TRUE(jpeg);
+        writeBytes(photo.folder / "a_depth.jpg",
+                   made::withSegments(*jpeg, {made::exifSegment(orientation, 28)}));
+        const auto view = photo.read();
+        ASSERT_TRUE(view) << view.error().text();
+        EXPECT_EQ(view->depth.width(), view->texture.width());
+        expectUpright(view->depth);
+        EXPECT_FALSE(photo.notesSay("upright"));
+    }
+}
+
+/// Without an orientation of its own the depth's size tells how it lies, where it can.
+TEST(PhotoDepth, DepthThatLiesAsTheSensorSawItIsTurnedAsItsPicture) {
+    for (const int orientation : {6, 8}) {
+        for (const bool asStored : {true, false}) {
+            for (const int part : {1, 2}) {
+                SCOPED_TRACE(fmt::format("{} {} {}", orientation, asStored, part));
+                TurnedBeside photo(orientation);
+                Image<std::uint8_t> codes(64 / part, 96 / part);
+                std::ranges::copy(quarterCodes(codes.size()), codes.data());
+                if (asStored) codes = turnedUpright(std::move(codes), orientation == 6 ? 8 : 6);
+                writeCodes(photo.folder / "a_depth.png", codes.width(), codes.height(), 8,
+                           [&](int x, int y) { return codes.at(x, y); });
+                const auto view = photo.read();
+                ASSERT_TRUE(view) << view.error().text();
+                expectUpright(view->depth);
+                EXPECT_EQ(photo.notesSay("turned as the picture is"), asStored);
+            }
+        }
+    }
+}
+
+TEST(PhotoDepth, InfoShowsTheSizeThatTheDepthHasUpright) {
+    for (const glm::ivec2 size : {glm::ivec2(96, 64), glm::ivec2(64, 96)}) {
+        TurnedBeside photo(6);
+        writeExr(photo.folder / "a_depth.exr",
+                 {{"Z", plane(size.x, size.y, [](int, int) { return 3; })}});
+        EXPECT_EQ(photo.depthOfInfo(), glm::ivec2(64, 96));
+    }
+}
+
+TEST(PhotoDepth, DepthWhoseSizeDoesNotTellIsTakenAsUpright) {
+    for (const int orientation : {1, 3}) {
+        TurnedBeside photo(orientation);
+        const auto codes = quarterCodes({96, 64});
+        writeCodes(photo.folder / "a_depth.png", 96, 64, 8,
+                   [&](int x, int y) { return codes[static_cast<std::size_t>(96 * y + x)]; });
+        const auto view = photo.read();
+        ASSERT_TRUE(view) << view.error().text();
+        expectUpright(view->depth);
+        EXPECT_EQ(photo.notesSay("is taken as upright"), orientation == 3);
+    }
 }

@@ -5,9 +5,11 @@
 #include <limits>
 #include <numbers>
 
+#include "formats/images/exif.hpp"
 #include "formats/stx/mesh_views.hpp"
 #include "lib/geometry/view_layout.hpp"
 #include "lib/model/splat_cloud.hpp"
+#include "tests/made_photos.hpp"
 #include "tests/small_bundle.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -29,6 +31,23 @@ ConvertSettings smallViews(const std::string& views) {
     settings.width = 32;
     settings.height = 24;
     return settings;
+}
+
+/// As viewers show them, whatever their EXIF says.
+TEST(Stx, PicturesAreOpenedUpright) {
+    TemporaryFolder folder;
+    Job job;
+    const Bytes stored = made::colourJpeg(32, 24);
+    ASSERT_TRUE(writeFile(folder / "plain.jpg", stored));
+    const auto plain = openPicture(folder / "plain.jpg", job);
+    ASSERT_TRUE(plain) << plain.error().text();
+    for (int orientation = 1; orientation <= 8; ++orientation) {
+        ASSERT_TRUE(writeFile(folder / "turned.jpg",
+                              made::withSegments(stored, {made::exifSegment(orientation, 28)})));
+        const auto turned = openPicture(folder / "turned.jpg", job);
+        ASSERT_TRUE(turned) << turned.error().text();
+        EXPECT_TRUE(turned->coded == turnedUpright(plain->coded, orientation)) << orientation;
+    }
 }
 
 TEST(Stx, ConvertsMeshByLayoutByBestViewsAndByCameras) {
