@@ -41,9 +41,9 @@ std::vector<int> rankViews(const std::vector<PruneView>& prepared, std::int64_t 
         ReferenceView view;
         view.camera = p.camera;
         view.depth = p.depth();
-        ofViews[i] = samplesOfView(view, static_cast<std::size_t>(i), stride, [&p](int x, int y) {
+        ofViews[i] = samplesOfView(view, static_cast<std::size_t>(i), stride, [&](int x, int y) {
             const PruneView::Surfel& s = p.surfel(x, y);
-            return std::pair(s.w, s.gradient);
+            return SurfacePoint{view.depth.at(x, y), s.w, s.gradient};
         });
     });
     std::vector<std::vector<Sighting>> seen(prepared.size());

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,8 @@ namespace {
 /// through a pixel is taken, of independent normal noise of standard deviation 1 (by simulation).
 /// On smooth surfaces the median would do; among leaves most differences are not noise.
 constexpr float kSmallestOfFour = 0.0416f;
+/// The same of the largest of the four.
+constexpr float kLargestOfFour = 1.206f;
 /// The same of bendWithoutCurve().
 constexpr float kSmallestOfTwo = 0.1905f;
 /// What does not bend evenly is noise up to so many times what it tells: noise is in both measures,
@@ -28,6 +31,11 @@ constexpr float kMoreThanCurves = 1.5f;
 /// that tell: of fewer, one in twenty is what two or three happen to have.
 constexpr int kNoiseRows = 64, kNoiseColumns = 3;
 constexpr std::size_t kFewestBends = 100;
+/// Depth is in steps where so many pixels have each of its values in the mean.
+constexpr std::size_t kPixelsOfValue = 3;
+/// Values that so many times more pixels have are other steps; fewer have those of mixed pixels.
+constexpr std::size_t kUnusual = 4;
+constexpr float kAboveSteps = 2.5f;
 /// Less noise than this share of q is left as it is: what codes and small shapes look like.
 constexpr float kLeastNoise = 0.001f;
 /// And than this share of a pixel's width: exact tori whose tubes are six pixels wide have up to
@@ -40,14 +48,9 @@ constexpr int kRadii[] = {1, 2, 4, 6, 8};
 constexpr float kAim = 0.001f;
 /// The window grows while all estimates so far agree within so many of their standard deviations.
 constexpr float kAgree = 2.0f;
-/// Points further from the plane than so many standard deviations are on another surface. The first
-/// round has no plane yet and measures from the point itself.
-struct Bands {
-    float first, then;
-};
 /// Wide bands leave surfaces as they are, narrow ones keep leaves apart that are no further from
 /// each other than the noise.
-constexpr Bands kWideBands{4.0f, 3.0f}, kNarrowBands{1.7f, 1.2f};
+constexpr SmoothSurface::Bands kWideBands{4.0f, 3.0f}, kNarrowBands{1.7f, 1.2f};
 /// The nine points around a pixel are one surface, however steep, where they are apart from a plane
 /// by less than so many standard deviations. 107 noisy cases of tests/sweep (seeds 700 and 701)
 /// +0.26 dB in the mean; 1.8 gives +0.36, and takes 0.1 from the statue with 0.5 %.
@@ -68,17 +71,20 @@ struct Around {
         const float there = q.at(x + dx, y + dy);
         return there > 0.0f ? std::optional(there) : std::nullopt;
     }
-    /// The smallest of the four second differences through the pixel. At edges and creases one of
-    /// them runs along the edge; noise is in all.
-    [[nodiscard]] std::optional<float> bend() const {
-        std::optional<float> least;
+    /// The smallest and the largest of the four second differences through the pixel. At edges and
+    /// creases one of them runs along the edge; noise is in all.
+    struct Bends {
+        float least = std::numeric_limits<float>::max(), most = 0;
+    };
+    [[nodiscard]] std::optional<Bends> bends() const {
+        Bends bends;
         for (const auto& [dx, dy] : {std::pair(1, 0), {0, 1}, {1, 1}, {1, -1}}) {
             const auto a = at(-dx, -dy), b = at(dx, dy);
             if (!a || !b) return std::nullopt;
             const float bend = std::abs(*a - 2.0f * q.at(x, y) + *b);
-            least = std::min(least.value_or(bend), bend);
+            bends = {std::min(bends.least, bend), std::max(bends.most, bend)};
         }
-        return least;
+        return bends;
     }
     /// What second differences have of their own second differences across them, the smaller of
     /// two pairs of directions: nothing of what bends evenly (the mask of Immerkaer 1996, and the
@@ -108,6 +114,104 @@ float oneInTwenty(std::vector<float>& values) {
     return *place;
 }
 
+/// Rows and columns of a view that are looked at for noise.
+struct NoiseGrid {
+    explicit NoiseGrid(const Image<float>& q)
+        : rows(std::max(1, q.height() / kNoiseRows)),
+          columns(std::clamp(q.width() / kNoiseRows, 1, kNoiseColumns)) {}
+    /// Calls for each of its pixels that has a point and is not at the border.
+    template <class Call>
+    void forEach(const Image<float>& q, const Call& call) const {
+        for (int y = first(); y + 1 < q.height(); y += rows)
+            for (int x = 1; x + 1 < q.width(); x += columns)
+                if (q.at(x, y) > 0.0f) call(x, y);
+    }
+    [[nodiscard]] int first() const { return std::max(1, rows / 2); }
+    /// Whether a row is looked at, or is beside one that is.
+    [[nodiscard]] bool needs(int y) const { return (y - first() + 1 + rows) % rows < 3; }
+    int rows, columns;
+};
+
+/// What is measured of noise, as shares of q.
+struct Measured {
+    float noise = 0;       ///< where the shape allows it
+    float everywhere = 0;  ///< of pixels that have it in all directions: nothing of clutter
+};
+
+/// Noise of `values`, as a share of `q`, which has points in the same places.
+Measured measure(const Image<float>& values, const Image<float>& q, const DepthAxis& axis) {
+    std::vector<float> bends, most, withoutCurve;
+    NoiseGrid(q).forEach(q, [&](int x, int y) {
+        const Around around{values, x, y};
+        const float scale = axis.relativeScale(q.at(x, y));
+        if (const auto of = around.bends()) {
+            bends.push_back(of->least / scale);
+            most.push_back(of->most / scale);
+        }
+        if (const auto bend = around.bendWithoutCurve()) withoutCurve.push_back(*bend / scale);
+    });
+    if (bends.size() < kFewestBends) return {};
+    Measured out{oneInTwenty(bends) / kSmallestOfFour, oneInTwenty(most) / kLargestOfFour};
+    // Among leaves nine pixels in a square are hardly ever on one surface; a ball of few pixels
+    // bends everywhere.
+    if (withoutCurve.size() >= bends.size() / 20)
+        out.noise =
+            std::min(out.noise, kMoreThanCurves * oneInTwenty(withoutCurve) / kSmallestOfTwo);
+    return out;
+}
+
+/// The steps of depth that is stored in few values.
+class DepthSteps {
+  public:
+    explicit DepthSteps(const Image<float>& q) {
+        std::vector<float> all;
+        NoiseGrid(q).forEach(q, [&](int x, int y) { all.push_back(q.at(x, y)); });
+        std::ranges::sort(all);
+        std::vector<std::size_t> pixels;
+        for (const float value : all) {
+            if (values_.empty() || values_.back() != value) {
+                values_.push_back(value);
+                pixels.push_back(0);
+            }
+            ++pixels.back();
+        }
+        if (values_.size() < 2 || all.size() < kPixelsOfValue * values_.size()) {
+            values_.clear();
+            return;
+        }
+        for (std::size_t i = 0; i < values_.size(); ++i) {
+            const auto usual = [&](std::size_t k) { return kUnusual * pixels[k] >= pixels[i]; };
+            std::size_t below = i, above = i + 1;
+            while (below > 0 && !usual(below - 1)) --below;
+            while (above < values_.size() && !usual(above)) ++above;
+            float width = std::numeric_limits<float>::max();
+            if (below > 0) width = values_[i] - values_[below - 1];
+            if (above < values_.size()) width = std::min(width, values_[above] - values_[i]);
+            widths_.push_back(below > 0 || above < values_.size() ? width : 0.0f);
+        }
+    }
+    [[nodiscard]] bool none() const { return values_.empty(); }
+    [[nodiscard]] float widest() const { return *std::ranges::max_element(widths_); }
+    /// The step at a value.
+    [[nodiscard]] float at(float q) const {
+        const auto next = std::ranges::lower_bound(values_, q) - values_.begin();
+        return widths_[std::min(static_cast<std::size_t>(next), widths_.size() - 1)];
+    }
+
+  private:
+    std::vector<float> values_, widths_;
+};
+
+/// Number `i` of a sequence that looks evenly spread from -0.5 to 0.5 (splitmix64; Steele et al.
+/// 2014).
+float evenlySpread(std::uint64_t i) {
+    std::uint64_t z = (i + 1) * 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    z ^= z >> 31;
+    return static_cast<float>(z >> 40) * 0x1p-24f - 0.5f;
+}
+
 /// The plane of the nine points around a pixel, if they are one within noise of `sigma`.
 std::optional<LocalPlane> planeOfNine(const Image<float>& q, int x, int y, float sigma) {
     constexpr float kFar = 1e6f;  // all weigh the same but for how near they are
@@ -133,7 +237,7 @@ LocalPlane planeAt(const Image<float>& q, int x, int y, float sigma) {
 }
 
 /// The bands for a view with so much noise, by how much clutter there is in it.
-Bands bandsFor(const Image<float>& q, const DepthAxis& axis, float noise) {
+SmoothSurface::Bands bandsFor(const Image<float>& q, const DepthAxis& axis, float noise) {
     double beside = 0;
     std::int64_t points = 0;
     for (int y = 1; y < q.height(); y += kClutterRows) {
@@ -187,35 +291,63 @@ std::optional<double> meanOfRows(const std::vector<double>& sums,
 }
 
 float depthNoise(const Image<float>& q, const DepthAxis& axis) {
-    std::vector<float> bends, withoutCurve;
-    const int rows = std::max(1, q.height() / kNoiseRows);
-    const int columns = std::clamp(q.width() / kNoiseRows, 1, kNoiseColumns);
-    for (int y = std::max(1, rows / 2); y + 1 < q.height(); y += rows) {
-        for (int x = 1; x + 1 < q.width(); x += columns) {
+    const float plain = measure(q, q, axis).noise;
+    const DepthSteps steps(q);
+    if (steps.none()) return plain;
+    // In steps, one in twenty bends is 0 or a whole step whatever the noise. So each value is
+    // spread evenly over its step, and what steps alone would give then is measured, too: the
+    // rounding of depth and the spread, each even over a step, on a plane.
+    Image<float> spread = q, rounding(q.width(), q.height());
+    const float plane = 4.0f * steps.widest();
+    const NoiseGrid grid(q);
+    for (int y = 0; y < q.height(); ++y) {
+        if (!grid.needs(y)) continue;
+        for (int x = 0; x < q.width(); ++x) {
             const float here = q.at(x, y);
             if (!(here > 0.0f)) continue;
-            const Around around{q, x, y};
-            const float scale = axis.relativeScale(here);
-            if (const auto bend = around.bend()) bends.push_back(*bend / scale);
-            if (const auto bend = around.bendWithoutCurve()) withoutCurve.push_back(*bend / scale);
+            const auto pixel = static_cast<std::uint64_t>(y) * q.width() + x;
+            const float width = steps.at(here), added = width * evenlySpread(2 * pixel);
+            spread.at(x, y) = here + added;
+            rounding.at(x, y) = plane + added + width * evenlySpread(2 * pixel + 1);
         }
     }
-    if (bends.size() < kFewestBends) return 0.0f;
-    const float noise = oneInTwenty(bends) / kSmallestOfFour;
-    // Among leaves nine pixels in a square are hardly ever on one surface; a ball of few pixels
-    // bends everywhere.
-    if (withoutCurve.size() < bends.size() / 20) return noise;
-    return std::min(noise, kMoreThanCurves * oneInTwenty(withoutCurve) / kSmallestOfTwo);
+    const Measured all = measure(spread, q, axis), ofSteps = measure(rounding, q, axis);
+    if (all.noise < kAboveSteps * ofSteps.noise ||
+        all.everywhere < kAboveSteps * ofSteps.everywhere)
+        return plain;
+    // What was added is taken away again; the rounding of the depth is part of its noise.
+    return std::max(plain, std::sqrt(all.noise * all.noise - 0.5f * ofSteps.noise * ofSteps.noise));
 }
 
 bool isNoisy(float noise, const DepthAxis& axis) {
     return noise >= kLeastNoise && noise >= kLeastOfPixel * axis.pixelShare();
 }
 
+SmoothSurface::SmoothSurface(const Image<float>& q, const DepthAxis& axis, float noise)
+    : q_(q), axis_(axis), noise_(noise), bands_(bandsFor(q, axis, noise)) {}
+
+SmoothSurface::Point SmoothSurface::at(int x, int y) const {
+    const float here = q_.at(x, y), scale = axis_.relativeScale(here), sigma = noise_ * scale;
+    LocalPlane plane = planeAt(q_, x, y, sigma);
+    float least = here - kAgree * sigma, most = here + kAgree * sigma;
+    Point point{here, glm::vec2(0.0f), sigma};
+    for (const int radius : kRadii) {
+        plane = fitAround(q_, x, y, radius, plane,
+                          (radius == kRadii[0] ? bands_.first : bands_.then) * sigma);
+        const float deviation = sigma / std::sqrt(std::max(plane.alike, 1.0f));
+        least = std::max(least, plane.q0 - kAgree * deviation);
+        most = std::min(most, plane.q0 + kAgree * deviation);
+        if (least > most) break;  // the surface bends
+        point = {plane.q0, {plane.gx, plane.gy}, deviation};
+        if (deviation < kAim * scale) break;
+    }
+    return point;
+}
+
 float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm::vec3>* surface) {
     if (!isNoisy(noise, axis)) return 0.0f;
     const Image<float> from = q;
-    const Bands bands = bandsFor(from, axis, noise);
+    const SmoothSurface smooth(from, axis, noise);
     if (surface) *surface = Image<glm::vec3>(q.width(), q.height(), glm::vec3(0.0f));
     std::vector<double> left(static_cast<std::size_t>(q.height()), 0.0);
     std::vector<std::int64_t> points(left.size(), 0);
@@ -223,26 +355,10 @@ float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm
         for (int x = 0; x < q.width(); ++x) {
             const float here = from.at(x, y);
             if (!(here > 0.0f)) continue;
-            const float sigma = noise * axis.relativeScale(here);
-            LocalPlane plane = planeAt(from, x, y, sigma);
-            float value = here, least = here - kAgree * sigma, most = here + kAgree * sigma;
-            float doubt = sigma;
-            glm::vec2 slope(0.0f);
-            for (const int radius : kRadii) {
-                plane = fitAround(from, x, y, radius, plane,
-                                  (radius == kRadii[0] ? bands.first : bands.then) * sigma);
-                const float deviation = sigma / std::sqrt(std::max(plane.alike, 1.0f));
-                least = std::max(least, plane.q0 - kAgree * deviation);
-                most = std::min(most, plane.q0 + kAgree * deviation);
-                if (least > most) break;  // the surface bends
-                value = plane.q0;
-                slope = {plane.gx, plane.gy};
-                doubt = deviation;
-                if (deviation < kAim * axis.relativeScale(here)) break;
-            }
-            if (value > 0.0f) q.at(x, y) = value;
-            if (surface) surface->at(x, y) = glm::vec3(slope, doubt);
-            left[y] += doubt / axis.relativeScale(here);
+            const SmoothSurface::Point point = smooth.at(x, y);
+            if (point.q > 0.0f) q.at(x, y) = point.q;
+            if (surface) surface->at(x, y) = glm::vec3(point.slope, point.doubt);
+            left[y] += point.doubt / axis.relativeScale(here);
             ++points[y];
         }
     });

@@ -7,6 +7,8 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/refine/noise.hpp"
+#include "lib/surface/depth_gradient.hpp"
 
 namespace stx {
 namespace {
@@ -21,6 +23,10 @@ double spread(std::int64_t i, double step) {
 /// The least cosine between the normals of a sample and of what is seen in its place. Beside a
 /// right angle the inside of one side is 0 from the outside of the other, which is as far away.
 constexpr double kSameSide = 0.1;
+
+/// Of noisy views only points that are sure are samples, where they are so large a part: leaves and
+/// what else is small have few.
+constexpr double kSureShare = 0.5;
 
 /// What seeing a piece of surface is worth, by how finely it is sampled (1 = as wanted, head-on).
 float worthOf(double sampling) {
@@ -102,7 +108,8 @@ Sighting sightingOf(const CandidateView& view, const SurfaceSample& sample) {
     const glm::dvec2 spacing = camera.sampleSpacing(pixel.z);
     const double tangent =
         std::sqrt(std::max(0.0, 1 - s.cosine * s.cosine)) / std::max(s.cosine, 0.1);
-    const double tolerance = std::max(spacing.x, spacing.y) * (0.3 + tangent) + view.step;
+    const double tolerance = std::max(spacing.x, spacing.y) * (0.3 + tangent) + view.step +
+                             kDoubt * view.noise * (camera.orthographic ? 1.0 : pixel.z);
     const int x0 = static_cast<int>(std::floor(pixel.x - 0.5)),
               y0 = static_cast<int>(std::floor(pixel.y - 0.5));
     for (int k = 0; k < 4 && !s.visible; ++k) {
@@ -119,28 +126,34 @@ Sighting sightingOf(const CandidateView& view, const SurfaceSample& sample) {
     return s;
 }
 
-CandidateView candidateOf(const ReferenceView& view) {
-    return {view.camera, view.camera, &view.depth,
-            view.depthBits == 32 ? 0.0 : view.depthCode().step()};
+CandidateView candidateOf(const ReferenceView& view, double noise) {
+    return {view.camera, view.camera,
+            &view.depth, view.depthBits == 32 ? 0.0 : view.depthCode().step(),
+            nullptr,     noise};
 }
 
 ViewSamples samplesOfView(const ReferenceView& view, std::size_t number, std::int64_t stride,
                           const SurfaceAt& surface) {
-    ViewSamples out;
+    ViewSamples all, sure;
     std::int64_t seen = static_cast<std::int64_t>(number) * 7919 % stride;
     for (int y = 0; y < view.depth.height(); ++y) {
         for (int x = 0; x < view.depth.width(); ++x) {
             if (!hasPoint(view.depth.at(x, y)) || seen++ % stride != 0) continue;
-            const auto [w, gradient] = surface(x, y);
+            const SurfacePoint point = surface(x, y);
             SurfaceSample s;
-            s.position = view.worldPoint(x, y);
-            s.normal = view.camera.orientation * planeNormal(view.camera, x, y, w, gradient);
-            out.samples.push_back(s);
-            const glm::dvec2 spacing = view.camera.sampleSpacing(view.depth.at(x, y));
-            out.ownDensity.push_back(1 / (spacing.x * spacing.y));
+            s.position =
+                view.camera.position +
+                view.camera.orientation * view.camera.unproject(x + 0.5, y + 0.5, point.dist);
+            s.normal =
+                view.camera.orientation * planeNormal(view.camera, x, y, point.w, point.gradient);
+            const glm::dvec2 spacing = view.camera.sampleSpacing(point.dist);
+            const double density = 1 / (spacing.x * spacing.y);
+            all.add(s, density);
+            if (point.sure) sure.add(s, density);
         }
     }
-    return out;
+    // What is off by much is seen by no other view, and would weigh as much as all that it hides.
+    return sure.samples.size() >= kSureShare * all.samples.size() ? sure : all;
 }
 
 namespace {
@@ -228,19 +241,21 @@ std::vector<SurfaceSample> setAreas(const std::vector<ViewSamples>& ofViews,
     return out;
 }
 
-std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count) {
+std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count,
+                                        std::vector<CandidateView>* candidates) {
     // Every stride-th point of each view, from normals as robust as can be.
     const std::int64_t stride = std::max<std::int64_t>(1, bundle.pointCount() / std::max(count, 1));
-    std::vector<CandidateView> views;
-    for (const ReferenceView& v : bundle.views) views.push_back(candidateOf(v));
+    std::vector<CandidateView> views(bundle.views.size());
     std::vector<ViewSamples> ofViews(bundle.views.size());
     parallelFor(0, views.size(), [&](std::int64_t i) {
         const ReferenceView& v = bundle.views[i];
-        const DepthSurface surface = depthSurface(v, {});
+        const ViewSurface surface(v);
+        views[i] = candidateOf(v, surface.noise());
+        ofViews[i] = samplesOfView(v, static_cast<std::size_t>(i), stride,
+                                   [&](int x, int y) { return surface.at(x, y); });
+    });
+    parallelFor(0, views.size(), [&](std::int64_t i) {
         ViewSamples& of = ofViews[i];
-        of = samplesOfView(v, static_cast<std::size_t>(i), stride, [&](int x, int y) {
-            return std::pair(surface.w.at(x, y), surface.gradient.at(x, y));
-        });
         for (std::size_t n = 0; n < of.samples.size(); ++n)
             of.samples[n].area =
                 areaOf(static_cast<std::size_t>(i), of.ownDensity[n], views.size(), stride,
@@ -249,6 +264,7 @@ std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count) {
     std::vector<SurfaceSample> samples;
     for (const ViewSamples& of : ofViews)
         samples.insert(samples.end(), of.samples.begin(), of.samples.end());
+    if (candidates) *candidates = std::move(views);
     return samples;
 }
 
@@ -285,12 +301,13 @@ Result<CoverProblem> coverProblem(const ViewTable& table, std::int64_t points, i
     const std::int64_t stride = std::max<std::int64_t>(1, points / std::max(count, 1));
     const std::size_t views = table.count();
     std::vector<ViewSamples> ofViews(views);
+    std::vector<double> noise(views);
     const auto sample = [&](std::size_t i,
                             const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
-        const DepthSurface surface = depthSurface(*view, {});
-        ofViews[i] = samplesOfView(*view, i, stride, [&](int x, int y) {
-            return std::pair(surface.w.at(x, y), surface.gradient.at(x, y));
-        });
+        const ViewSurface surface(*view);
+        noise[i] = surface.noise();
+        ofViews[i] =
+            samplesOfView(*view, i, stride, [&](int x, int y) { return surface.at(x, y); });
         return {};
     };
     STX_CHECK(forEachView(table, peak::kSelect, job, sample));
@@ -309,7 +326,7 @@ Result<CoverProblem> coverProblem(const ViewTable& table, std::int64_t points, i
     std::vector<std::vector<SeenSample>> seen(views);
     const auto look = [&](std::size_t k,
                           const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
-        const CandidateView candidate = candidateOf(*view);
+        const CandidateView candidate = candidateOf(*view, noise[k]);
         added[k].resize(samples.size(), 0.0);
         seen[k] = seenOf(samples.size(), [&](std::size_t i) {
             const Sighting s = sightingOf(candidate, samples[i]);

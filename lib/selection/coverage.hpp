@@ -11,7 +11,7 @@
 #include "lib/model/mesh.hpp"
 #include "lib/model/view_table.hpp"
 #include "lib/selection/cover.hpp"
-#include "lib/surface/depth_gradient.hpp"
+#include "lib/selection/view_surface.hpp"
 
 namespace stx {
 
@@ -33,6 +33,7 @@ struct CandidateView {
     /// Unit, world, towards the camera, where `depth` has a point; may be left out. With them the
     /// inside of a surface is not seen where its outside is.
     const Image<glm::vec3>* normal = nullptr;
+    double noise = 0;  ///< of `depth`: see ViewSurface::noise()
 };
 
 /// About `count` places, evenly spread over a mesh's triangles (points of a cloud count as
@@ -40,10 +41,11 @@ struct CandidateView {
 /// has two samples in each place, one for each side. Deterministic.
 [[nodiscard]] std::vector<SurfaceSample> sampleMesh(const Mesh& mesh, int count);
 
-/// About `count` samples of all that the views of a bundle show. A surface seen by many views
-/// counts once: each sample's area is the inverse of the density with which all views sample its
-/// place.
-[[nodiscard]] std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count);
+/// About `count` samples of all that the views of a bundle show, by the noise of each view. A
+/// surface seen by many views counts once: each sample's area is the inverse of the density with
+/// which all views sample its place. `candidates`, if any, gets the views as candidates.
+[[nodiscard]] std::vector<SurfaceSample> sampleBundle(
+    const Bundle& bundle, int count, std::vector<CandidateView>* candidates = nullptr);
 
 /// How often and how well a candidate samples a piece of surface.
 struct Sighting {
@@ -62,18 +64,24 @@ struct SeenSample {
 [[nodiscard]] std::vector<SeenSample> seenBy(const CandidateView& view,
                                              const std::vector<SurfaceSample>& samples);
 
-/// A view of a bundle as a candidate; its depth must outlive it.
-[[nodiscard]] CandidateView candidateOf(const ReferenceView& view);
+/// A view of a bundle as a candidate; its depth must outlive it. `noise`: see ViewSurface::noise().
+[[nodiscard]] CandidateView candidateOf(const ReferenceView& view, double noise = 0);
 
 /// sampleBundle() for views that are looked at one by one: first samplesOfView() of each, then how
 /// each sees the samples of all, then setAreas().
 struct ViewSamples {
     std::vector<SurfaceSample> samples;  ///< without their areas
     std::vector<double> ownDensity;      ///< of each: with which its view samples it, squared
+
+    void add(const SurfaceSample& sample, double density) {
+        samples.push_back(sample);
+        ownDensity.push_back(density);
+    }
 };
-/// w and its gradient at a pixel with a point, as of depthSurface().
-using SurfaceAt = std::function<std::pair<float, glm::vec2>(int x, int y)>;
-/// Every `stride`-th point of view `number` of a bundle.
+/// At a pixel with a point.
+using SurfaceAt = std::function<SurfacePoint(int x, int y)>;
+/// Every `stride`-th point of view `number` of a bundle; without those that are not sure, if they
+/// are few.
 [[nodiscard]] ViewSamples samplesOfView(const ReferenceView& view, std::size_t number,
                                         std::int64_t stride, const SurfaceAt& surface);
 /// All samples, in the order of the views, with their areas; `seen`: for each view a sighting of

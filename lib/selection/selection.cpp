@@ -98,14 +98,12 @@ Result<Selection> selectViews(const Bundle& bundle, const SelectSettings& settin
     STX_CHECK(checkSettings(settings));
     STX_CHECK(bundle.check());
     STX_CHECK(checkPeak(peak::kSelect, bundle.views, job.limits));
-    std::vector<CandidateView> candidates;
     std::vector<std::int64_t> points;
-    for (const auto& v : bundle.views) {
-        candidates.push_back(candidateOf(v));
-        points.push_back(v.pointCount());
-    }
+    for (const auto& v : bundle.views) points.push_back(v.pointCount());
     STX_CHECK(checkPoints(points, job));
-    const auto samples = sampleBundle(bundle, samplesFor(settings, bundle.views.size()));
+    std::vector<CandidateView> candidates;
+    const auto samples =
+        sampleBundle(bundle, samplesFor(settings, bundle.views.size()), &candidates);
     STX_CHECK(job.checkCancelled());
     const auto problem = coverProblem(samples, candidates, settings.targetDensity);
     STX_CHECK(job.checkCancelled());

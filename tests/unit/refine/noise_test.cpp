@@ -47,6 +47,30 @@ TEST(DepthNoise, IsMeasuredWhateverTheShape) {
     EXPECT_EQ(depthNoise(Image<float>(8, 8, 0.0f), {}), 0.0f);
 }
 
+/// q in whole steps.
+Image<float> inSteps(Image<float> q, double step) {
+    for (float& value : q.pixels())
+        value = static_cast<float>(std::round(static_cast<double>(value) / step) * step);
+    return q;
+}
+
+// Disparities of a Kinect are eighths of a pixel: more than one in twenty bends are 0 then.
+TEST(DepthNoise, OfDepthInStepsIsMeasured) {
+    for (const double noise : {0.005, 0.02}) {
+        // Values are around 0.26, steps noise / 1, 2, 8 and 32 of them.
+        for (const double steps : {1.0, 2.0, 8.0, 32.0}) {
+            EXPECT_NEAR(depthNoise(inSteps(steppedPlane(0.3, noise), 0.26 * noise / steps), {}),
+                        noise, 0.25 * noise)
+                << noise << " " << steps;
+        }
+    }
+}
+
+TEST(DepthNoise, StepsAloneAreNone) {
+    for (const double step : {0.0005, 0.002, 0.01, 0.03})
+        EXPECT_LT(depthNoise(inSteps(steppedPlane(0.3, 0), step), {}), 0.001) << step;
+}
+
 /// q of a ball so many pixels wide, from three radii away, with noise (a share).
 Image<float> ballOf(int pixels, double noise) {
     Image<float> q(pixels, pixels, 0.0f);
@@ -69,6 +93,9 @@ TEST(DepthNoise, WhatBendsEvenlyIsNone) {
         EXPECT_LT(depthNoise(ballOf(pixels, 0), {}), 0.001) << pixels;
     for (const int pixels : {31, 64, 200})
         EXPECT_NEAR(depthNoise(ballOf(pixels, 0.02), {}), 0.02, 0.01) << pixels;
+    for (const int pixels : {31, 64, 200})
+        for (const double step : {0.0005, 0.002, 0.01})
+            EXPECT_LT(depthNoise(inSteps(ballOf(pixels, 0), step), {}), 0.001) << pixels << step;
 }
 
 TEST(DepthNoise, SmoothingLeavesAFifthOfItAndKeepsTheStep) {

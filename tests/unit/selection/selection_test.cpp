@@ -3,12 +3,14 @@
 #include <atomic>
 #include <random>
 #include <set>
+#include <utility>
 
 #include <gtest/gtest.h>
 
 #include "lib/base/parallel.hpp"
 #include "lib/selection/cover.hpp"
 #include "lib/selection/coverage.hpp"
+#include "tests/noisy_depth.hpp"
 #include "tests/unit/surface/analytic.hpp"
 
 namespace stx {
@@ -146,6 +148,31 @@ TEST(Selection, FromABundleDropsWhatAddsNothing) {
     EXPECT_GE(half->quality.back(), 0.5);
 }
 
+// Among noisy views a selection said that it sees 59 % of the surface where it saw 84.
+TEST(Selection, FromNoisyViewsIsAsFromExactOnes) {
+    Bundle exact;
+    for (int i = 0; i < 16; ++i) {
+        const double a = 2.39996 * i, z = 0.9 - 1.8 * (i + 0.5) / 16, r = std::sqrt(1 - z * z);
+        exact.views.push_back(analytic::capture(
+            analytic::torus,
+            analytic::lookingAt(3.0 * glm::dvec3(r * std::cos(a), r * std::sin(a), z), 128), 32));
+    }
+    Bundle noisy = exact;
+    noisy::addNoise(noisy, 0.02);
+    SelectSettings settings;
+    settings.count = 4;
+    Job job;
+    const auto four = selectViews(exact, settings, job),
+               fourNoisy = selectViews(noisy, settings, job);
+    ASSERT_TRUE(four && fourNoisy);
+    EXPECT_NEAR(fourNoisy->coverage, four->coverage, 0.05);
+    settings.count = 0;
+    const auto some = selectViews(exact, settings, job),
+               someNoisy = selectViews(noisy, settings, job);
+    ASSERT_TRUE(some && someNoisy);
+    EXPECT_LE(someNoisy->views.size(), some->views.size() + 3);
+}
+
 /// Gives copies: nothing is held.
 class ViewsToSelect : public ViewTable {
   public:
@@ -181,8 +208,9 @@ TEST(Selection, OneByOneIsThatOfAllInMemory) {
             analytic::torus,
             analytic::lookingAt(3.0 * glm::normalize(glm::dvec3(side(), side(), side())), 96), 16));
     bundle.views[4].depth = Image<float>(96, 96, kNoDepth);
-    const ViewsToSelect table(bundle);
-    for (const int count : {0, 1, 5}) {
+    for (const auto& [count, noise] : {std::pair(0, 0.0), {1, 0.0}, {5, 0.0}, {5, 0.02}}) {
+        noisy::addNoise(bundle, noise);
+        const ViewsToSelect table(bundle);
         SelectSettings settings;
         settings.count = count;
         settings.samples = 3000;
@@ -202,7 +230,7 @@ TEST(Selection, OneByOneIsThatOfAllInMemory) {
     }
     Job job;
     job.limits.maxMemoryBytes = 96 * 96 * 20;
-    const auto refused = selectViews(table, {}, job);
+    const auto refused = selectViews(ViewsToSelect(bundle), {}, job);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::invalidInput);
 }
