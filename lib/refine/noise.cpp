@@ -35,6 +35,9 @@ constexpr std::size_t kFewestBends = 100;
 constexpr std::size_t kPixelsOfValue = 3;
 /// Values that so many times more pixels have are other steps; fewer have those of mixed pixels.
 constexpr std::size_t kUnusual = 4;
+/// What second differences of depth in steps must be, times those that its steps make alone, the
+/// smallest and the largest: exact oaktree in 8 bits comes to 5.2 and 2.0, Kinect's disparities
+/// with 1.65 % of noise in steps of 0.8 % to about 5 and 5, Open3D's recording to 1.7.
 constexpr float kAboveSteps = 2.5f;
 /// Less noise than this share of q is left as it is: what codes and small shapes look like.
 constexpr float kLeastNoise = 0.001f;

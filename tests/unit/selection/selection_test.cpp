@@ -148,7 +148,7 @@ TEST(Selection, FromABundleDropsWhatAddsNothing) {
     EXPECT_GE(half->quality.back(), 0.5);
 }
 
-// Among noisy views a selection said that it sees 59 % of the surface where it saw 84.
+// Of noisy views a selection said that it sees 59 % of the surface; of exact ones 98.
 TEST(Selection, FromNoisyViewsIsAsFromExactOnes) {
     Bundle exact;
     for (int i = 0; i < 16; ++i) {
