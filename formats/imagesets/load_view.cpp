@@ -38,10 +38,18 @@ Result<Camera> cameraOfSize(const SetView& set, int width, int height) {
         c.cx = width * 0.5;
         c.cy = height * 0.5;
     }
+    // Principal points are near the middle of pictures.
+    constexpr double kNearMiddle = 0.1;
+    if (set.sizeGuessed && std::abs(c.width - width) <= kNearMiddle * width &&
+        std::abs(c.height - height) <= kNearMiddle * height) {
+        c.width = width;
+        c.height = height;
+    }
     if (c.width != width || c.height != height)
         return fail(ErrorCode::invalidInput,
-                    "'{}' is {}x{}, but the camera '{}' has {}x{} pixels; both must match",
-                    set.texture.name, width, height, set.name, c.width, c.height);
+                    "'{}' is {}x{}, but the camera '{}' has {}x{} pixels{}; both must match",
+                    set.texture.name, width, height, set.name, c.width, c.height,
+                    set.sizeGuessed ? " by its principal point, as 'w' and 'h' are missing" : "");
     if (auto ok = c.check(); !ok)
         return tl::unexpected(ok.error().at(fmt::format("camera '{}'", set.name)));
     return c;

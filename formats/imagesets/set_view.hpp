@@ -92,9 +92,10 @@ struct SetView {
     std::optional<double> time;
     std::string taker;
 
-    bool stretched = false;  ///< its depth covers the picture, whatever the shapes of both are
-    bool sensor = false;     ///< mixed pixels at depth edges are to be expected
-    bool measured = false;   ///< stereo's disparities: gaps, and edges beside the picture's
+    bool sizeGuessed = false;  ///< the camera's, from its principal point
+    bool stretched = false;    ///< its depth covers the picture, whatever the shapes of both are
+    bool sensor = false;       ///< mixed pixels at depth edges are to be expected
+    bool measured = false;     ///< stereo's disparities: gaps, and edges beside the picture's
     /// Planes and code of an export of ours; used when they hold all points.
     std::optional<DepthCode> planes;
     int depthBits = 0;                        ///< with planes: 8, 16, 32

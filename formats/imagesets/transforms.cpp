@@ -108,7 +108,8 @@ Result<void> setIntrinsics(const Json& file, const Json& frame, const std::strin
                       "neither 'fl_x' nor 'camera_angle_x' is given");
     if (c.width == 0) {
         if (fx && cx && cy) {
-            // Old files leave out w and h where the principal point is the middle.
+            // Old files leave out w and h where the principal point is the middle, or near it.
+            view.sizeGuessed = true;
             c.width = static_cast<int>(std::lround(*cx * 2));
             c.height = static_cast<int>(std::lround(*cy * 2));
             if (c.width < 1 || c.height < 1 || c.width > 65535 || c.height > 65535)

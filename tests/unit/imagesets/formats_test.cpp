@@ -360,6 +360,24 @@ TEST(Transforms, MillimetresAndNamesWithoutAnEnding) {
     expectSame(views[0], read->views[0], [](double) { return 0.0005; });
 }
 
+// The principal point, 3.25 and -1.75 pixels from the middle, tells the size but for that.
+TEST(Transforms, WithoutTheSizeTakeThePicturesNearTheMiddle) {
+    const auto views = roomViews(1);
+    TemporaryFolder folder;
+    writeColour(folder / "a.png", views[0]);
+    writeCodes(folder / "d.png", 96, 64, 16,
+               [&](int x, int y) { return std::lround(views[0].depth.at(x, y) * 1000); });
+    std::string text = transformsJson(views[0].camera, "");
+    text.replace(text.find("\"w\":96,\"h\":64,"), 14, "");
+    writeText(folder / "transforms.json", text);
+    const auto read = readSet(folder.path());
+    ASSERT_TRUE(read) << read.error().text();
+    expectSame(views[0], read->views[0], [](double) { return 0.0005; });
+    text.replace(text.find("\"cx\":"), 5, "\"cx\":1");
+    writeText(folder / "transforms.json", text);
+    expectError(readSet(folder.path()), {"a.png", "96x64", "'w' and 'h' are missing"});
+}
+
 TEST(Transforms, BadOnesAreOneSentenceEach) {
     const auto views = roomViews(1);
     TemporaryFolder folder;
