@@ -57,7 +57,10 @@ Tile depthError(const Image<float>& a, const Image<float>& b, glm::ivec2 cell) {
     ValueRange range = rangeOf(difference);
     if (!range.empty()) range.least = 0;
     // The differences over the pixels that only one has.
-    Tile tile{shrunk(lonely, cell), rangeText("differ by", range), !range.empty()};
+    // As short as the tile is narrow.
+    Tile tile{shrunk(lonely, cell),
+              range.empty() ? "nothing in both" : fmt::format("to {:.3g} off", range.most),
+              !range.empty()};
     const auto values = shrunkValues(difference, cell);
     for (std::size_t i = 0; i < values.count(); ++i)
         if (std::isfinite(values.data()[i]) && tile.picture.data()[i] == kEmptyColour)
@@ -114,9 +117,9 @@ Result<Sheet> sheetOf(const std::vector<SheetPair>& pairs, const SheetSettings& 
             range.add(rangeOf(pair.depthB));
             const auto side = [&](const Image<float>& depth) {
                 return Tile{falseColour(shrunkValues(depth, plan.cell), range, kEmptyColour),
-                            rangeText("depth", range), !range.empty()};
+                            "depth", !range.empty()};
             };
-            groups.push_back({{pair.title, "depth"}, {}});
+            groups.push_back({{pair.title, rangeText("depth", range)}, {}});
             groups.back().tiles.push_back(side(pair.depthA));
             groups.back().tiles.push_back(side(pair.depthB));
             groups.back().tiles.push_back(depthError(pair.depthA, pair.depthB, plan.cell));
