@@ -21,6 +21,11 @@ Result<ImageSetSummary> summariseImageSet(const std::filesystem::path& path, Job
         options.depthMax = 2;
     }
     auto described = describeSet(path, options, job);
+    if (!described && described.error().code == ErrorCode::usage && summary.kind == "photo") {
+        job.note(fmt::format("{}; white is taken for it here", described.error().text()));
+        options.photo.nearIs = NearIs::white;
+        described = describeSet(path, options, job);
+    }
     if (!described && described.error().code == ErrorCode::usage) {
         job.note(fmt::format("cameras are not known: {}", described.error().text()));
         summary.camerasKnown = false;
