@@ -185,7 +185,7 @@ class BtWriter {
         ++depth_;
         ++bufferDepth_;
         WritingScope outer = std::move(scope_);
-        scope_ = WritingScope::inside(outer);
+        scope_ = WritingScope::inside(outer, commands);
         for (const Command& command : commands) {
             std::visit([&](const auto& c) { write(c); }, command);
             out_ += '\n';

@@ -222,7 +222,7 @@ std::string TextNames::uniqueName(std::string text) const {
 std::string TextNames::define(const Route& route) {
     std::string text = textNameOf(route);
     if (text.empty()) return text;
-    text = plainName(std::move(text));
+    text = reached_.contains(route.id) ? nameOfId('R', route.id) : plainName(std::move(text));
     const std::string base = text;
     // The same name for another number, as commands may bring it.
     for (int i = 2; routeIds_.contains(text) && routeIds_[text] != route.id; ++i)
@@ -238,10 +238,16 @@ std::string TextNames::routeOf(std::uint32_t id) const {
     return outer_ != nullptr ? outer_->routeOf(id) : nameOfId('R', id);
 }
 
-TextNames TextNames::inside(const TextNames& outer) {
+TextNames TextNames::inside(const TextNames& outer, const std::vector<Command>& commands) {
     TextNames names;
     names.limits_ = outer.limits_;
     names.outer_ = &outer;
+    for (const Command& command : commands) {
+        if (const auto* gone = std::get_if<DeleteRoute>(&command))
+            names.reached_.insert(gone->routeId);
+        if (const auto* replaced = std::get_if<ReplaceRoute>(&command))
+            names.reached_.insert(replaced->routeId);
+    }
     return names;
 }
 

@@ -56,8 +56,10 @@ class TextNames {
     [[nodiscard]] static TextNames ofBody(const Proto& proto);
 
     /// The names in a buffer of commands: nodes of `outer` have theirs and are there already; nodes
-    /// that the commands bring get one when they are first asked for.
-    [[nodiscard]] static TextNames inside(const TextNames& outer);
+    /// that the commands bring get one when they are first asked for. ROUTEs that `commands` bring
+    /// and reach again have numbers for names: text has no other way in buffers.
+    [[nodiscard]] static TextNames inside(const TextNames& outer,
+                                          const std::vector<Command>& commands);
     /// The commands of a buffer in the scene that is being written.
     [[nodiscard]] Result<std::vector<Command>> commandsOf(const CommandBuffer& buffer) const;
     /// To be called before a scene is written (ReplaceScene), once for each.
@@ -86,6 +88,7 @@ class TextNames {
     std::unordered_set<const Node*> written_;
     std::unordered_map<std::uint32_t, std::string> routes_;  ///< names of those that were defined
     std::unordered_map<std::string, std::uint32_t> routeIds_;
+    std::unordered_set<std::uint32_t> reached_;  ///< by commands of this buffer
 };
 
 /// Where a writer is: the names there, and the PROTO whose body it writes.
@@ -98,8 +101,9 @@ struct WritingScope {
         return {TextNames::ofBody(proto), &proto, linksOf(proto)};
     }
     /// Of a buffer of commands; `outer` must stay where it is meanwhile.
-    [[nodiscard]] static WritingScope inside(const WritingScope& outer) {
-        return {TextNames::inside(outer.names), nullptr, {}};
+    [[nodiscard]] static WritingScope inside(const WritingScope& outer,
+                                             const std::vector<Command>& commands) {
+        return {TextNames::inside(outer.names, commands), nullptr, {}};
     }
 };
 

@@ -270,7 +270,7 @@ class XmtWriter {
         open("buffer");
         ++bufferDepth_;
         WritingScope outer = std::move(scope_);
-        scope_ = WritingScope::inside(outer);
+        scope_ = WritingScope::inside(outer, commands);
         for (const Command& command : commands)
             std::visit([&](const auto& c) { write(c); }, command);
         scope_ = std::move(outer);
