@@ -6,17 +6,14 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
+#include "lib/geometry/like_steps.hpp"
 
 namespace stx::imagesets {
 namespace {
 
-/// Samples whose distances differ by less belong to one surface.
+/// Samples whose distances differ by less belong to one surface; of those that differ by more those
+/// of a slope do (likeSteps()).
 constexpr float kOneSurface = 0.02f;
-/// Those that differ by more do, where 1 / distance goes on as beside them: by steps that differ by
-/// less than this share of the larger. Of a plane they are equal in a pinhole's picture; in that of
-/// a fisheye 60 degrees off its axis they differ by 3.5 % at a focal length of 100 pixels. At an
-/// edge they differ by all of the step.
-constexpr float kStepsAlike = 0.25f;
 
 /// Columns beyond the edge: the other edge's in closed panoramas, else the last.
 struct Edges {
@@ -62,10 +59,6 @@ glm::vec4 colourAt(const Get& get, const Edges& edges, glm::dvec2 at) {
     return p.a > 0 ? glm::vec4(glm::vec3(p) / p.a, p.a) : glm::vec4(0);
 }
 
-bool stepsAlike(float a, float b) {
-    return std::abs(a - b) <= kStepsAlike * std::max(std::abs(a), std::abs(b));
-}
-
 /// Whether the samples `from` and the next one along `step` are of one surface: near each other, or
 /// on a slope that goes on at both sides, or by two steps at one. Two steps, as a pixel that mixes
 /// two surfaces makes one step of an edge two.
@@ -78,9 +71,9 @@ bool sameSurface(const Image<float>& depth, const Edges& edges, glm::ivec2 from,
     const float own = q[3] - q[2];
     if (std::abs(own) <= kOneSurface * std::max(q[2], q[3])) return true;
     const float before = q[2] - q[1], after = q[4] - q[3];
-    const bool goesOnBefore = stepsAlike(own, before), goesOnAfter = stepsAlike(own, after);
-    return (goesOnBefore && (goesOnAfter || stepsAlike(before, q[1] - q[0]))) ||
-           (goesOnAfter && stepsAlike(after, q[5] - q[4]));
+    const bool goesOnBefore = likeSteps(own, before), goesOnAfter = likeSteps(own, after);
+    return (goesOnBefore && (goesOnAfter || likeSteps(before, q[1] - q[0]))) ||
+           (goesOnAfter && likeSteps(after, q[5] - q[4]));
 }
 
 float depthAt(const Image<float>& depth, const Edges& edges, glm::dvec2 at) {

@@ -5,6 +5,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
+#include "lib/geometry/like_steps.hpp"
 
 namespace stx {
 namespace {
@@ -14,23 +15,14 @@ namespace {
 constexpr float kStepOfEdge = 0.025f;
 /// How much larger than the slope of the surfaces beside it a step must be.
 constexpr float kBeyondSlope = 3.0f;
-/// Steps of 1 / distance that differ by less, as a share of the larger, are of one slope. A plane's
-/// are equal; those of a fisheye's picture with a focal length of 60 pixels differ by less up to 75
-/// degrees off its axis.
-constexpr float kSameSlope = 0.25f;
-
-bool sameSlope(float a, float b) {
-    return std::abs(a - b) <= kSameSlope * std::max(std::abs(a), std::abs(b));
-}
-
 /// Whether five samples in a row are of a slope around the third: its steps go on at both sides,
 /// and beyond one of these. Between two surfaces the steps to them may be alike, those beyond are
 /// not.
 bool onSlope(float a2, float a, float z, float b, float b2) {
     if (!hasPoint(a) || !hasPoint(b)) return false;
     const float stepA = 1 / z - 1 / a, stepB = 1 / b - 1 / z;
-    return sameSlope(stepA, stepB) && ((hasPoint(a2) && sameSlope(1 / a - 1 / a2, stepA)) ||
-                                       (hasPoint(b2) && sameSlope(1 / b2 - 1 / b, stepB)));
+    return likeSteps(stepA, stepB) && ((hasPoint(a2) && likeSteps(1 / a - 1 / a2, stepA)) ||
+                                       (hasPoint(b2) && likeSteps(1 / b2 - 1 / b, stepB)));
 }
 
 }  // namespace
