@@ -57,7 +57,7 @@ Result<void> setTextOptions(const std::string& option, const std::string& text,
 SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
     SaveOptions save;
     save.noClobber = program.common.noClobber;
-    save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(92) : 0;
+    save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(kJpegQuality) : 0;
     if (!o.video.empty()) save.h264 = o.crf.value_or(18);
     save.pointTexture = o.pointTexture;
     save.octreeLevels = o.octreeLevels;
@@ -499,8 +499,7 @@ void addSetOptions(Command& c, const std::shared_ptr<ConvertOptions>& o) {
         "--strict", o->open.set.strict,
         "Stop at a view whose files are missing (transforms, TUM, 7-Scenes) or that has no usable "
         "depth, instead of leaving it out, and at frames of films that are missing or damaged, "
-        "instead of showing the ones "
-        "before");
+        "instead of showing the ones before");
 }
 
 /// Where the files of a set are, and how to read them.

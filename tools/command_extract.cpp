@@ -105,7 +105,7 @@ Result<std::size_t> countPoints(const ViewTable& table, Job& job) {
 SurfacesOptions modelOf(const ExtractOptions& o) {
     const bool jpeg = o.colour.empty() ? o.triangles > 0 : o.colour == "jpeg";
     return {.mostTriangles = static_cast<std::size_t>(o.triangles),
-            .jpegQuality = jpeg ? o.quality.value_or(92) : 0};
+            .jpegQuality = jpeg ? o.quality.value_or(kJpegQuality) : 0};
 }
 
 /// What is written.
@@ -265,7 +265,7 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         return extractPicture(
             o.input, o.open, o.output,
             wanted.as == ExtractAs::pair ? DepthPicture::pair : DepthPicture::sideBySide,
-            o.quality.value_or(92), o.view, o.time, o.refine, program);
+            o.quality.value_or(kJpegQuality), o.view, o.time, o.refine, program);
     // As exact as PNG for what is JPEG already, and smaller than to code it again.
     o.open.keepColourFiles = wanted.ending == ".html" && o.colour != "png" && !o.quality;
     if (wanted.shown)

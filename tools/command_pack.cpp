@@ -103,7 +103,7 @@ Result<PruneReport> pruneOne(Bundle& bundle, const PackOptions& o, const std::st
 
 AtlasSaveOptions saveOptions(const PackOptions& o, const Program& program) {
     AtlasSaveOptions save;
-    save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(92) : 0;
+    save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(kJpegQuality) : 0;
     save.output = program.outputOptions();
     return save;
 }

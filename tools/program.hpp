@@ -36,6 +36,9 @@ struct CommonOptions {
 /// clears all that it hands out, page by page, which took a seventh of the time of a sequence.
 void keepFreedMemory();
 
+/// Quality of JPEG where none is asked for.
+inline constexpr int kJpegQuality = 92;
+
 /// What a command gets: its options, a Job to pass on, and where to say things.
 class Program {
   public:

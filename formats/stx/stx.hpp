@@ -264,8 +264,7 @@ class PicturePair {
 
 /// Opens a picture of any format that the codecs know (PNG, JPEG, TIFF, OpenEXR, ...), and of HEIC
 /// without its depth; turned upright, as the EXIF of a JPEG, PNG or HEIC says. OpenEXR is its
-/// display window; what is not stored of it is black, and
-/// transparent where the file has alpha.
+/// display window; what is not stored of it is black, and transparent where the file has alpha.
 /// Errors: io, invalidInput, unsupported (the module of image codecs is not there).
 [[nodiscard]] Result<Picture> openPicture(const std::filesystem::path& path, Job& job);
 

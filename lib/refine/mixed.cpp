@@ -15,6 +15,7 @@ namespace {
 constexpr float kStepOfEdge = 0.025f;
 /// How much larger than the slope of the surfaces beside it a step must be.
 constexpr float kBeyondSlope = 3.0f;
+
 /// Whether five samples in a row are of a slope around the third: its steps go on at both sides,
 /// and beyond one of these. Between two surfaces the steps to them may be alike, those beyond are
 /// not.

@@ -35,10 +35,10 @@ constexpr std::size_t kFewestBends = 100;
 constexpr std::size_t kPixelsOfValue = 3;
 /// Values that so many times more pixels have are other steps; fewer have those of mixed pixels.
 constexpr std::size_t kUnusual = 4;
-/// What second differences of depth in steps must be, times those that its steps make alone, the
-/// smallest and the largest: exact oaktree in 8 bits comes to 5.2 and 2.0, Kinect's disparities
-/// with 1.65 % of noise in steps of 0.8 % to about 5 and 5, Open3D's recording to 1.7.
-constexpr float kAboveSteps = 2.5f;
+/// What second differences of depth in steps must be, times those that its steps make alone, both
+/// the smallest and the largest: views of exact oaktree in 8 bits come to 1.3 to 4.3, of Kinect's
+/// disparities with 1.65 % of noise in steps of 0.8 % to 4.8 to 5.5, of Open3D's recording to 1.5.
+constexpr float kAboveSteps = 4.5f;
 /// Less noise than this share of q is left as it is: what codes and small shapes look like.
 constexpr float kLeastNoise = 0.001f;
 /// And than this share of a pixel's width: exact tori whose tubes are six pixels wide have up to
@@ -119,20 +119,18 @@ float oneInTwenty(std::vector<float>& values) {
 
 /// Rows and columns of a view that are looked at for noise.
 struct NoiseGrid {
-    explicit NoiseGrid(const Image<float>& q)
-        : rows(std::max(1, q.height() / kNoiseRows)),
-          columns(std::clamp(q.width() / kNoiseRows, 1, kNoiseColumns)) {}
+    static NoiseGrid of(const Image<float>& q) {
+        const int rows = std::max(1, q.height() / kNoiseRows);
+        return {std::max(1, rows / 2), rows, std::clamp(q.width() / kNoiseRows, 1, kNoiseColumns)};
+    }
     /// Calls for each of its pixels that has a point and is not at the border.
     template <class Call>
     void forEach(const Image<float>& q, const Call& call) const {
-        for (int y = first(); y + 1 < q.height(); y += rows)
+        for (int y = first; y + 1 < q.height(); y += rows)
             for (int x = 1; x + 1 < q.width(); x += columns)
                 if (q.at(x, y) > 0.0f) call(x, y);
     }
-    [[nodiscard]] int first() const { return std::max(1, rows / 2); }
-    /// Whether a row is looked at, or is beside one that is.
-    [[nodiscard]] bool needs(int y) const { return (y - first() + 1 + rows) % rows < 3; }
-    int rows, columns;
+    int first, rows, columns;
 };
 
 /// What is measured of noise, as shares of q.
@@ -142,9 +140,10 @@ struct Measured {
 };
 
 /// Noise of `values`, as a share of `q`, which has points in the same places.
-Measured measure(const Image<float>& values, const Image<float>& q, const DepthAxis& axis) {
+Measured measure(const Image<float>& values, const Image<float>& q, const NoiseGrid& grid,
+                 const DepthAxis& axis) {
     std::vector<float> bends, most, withoutCurve;
-    NoiseGrid(q).forEach(q, [&](int x, int y) {
+    grid.forEach(q, [&](int x, int y) {
         const Around around{values, x, y};
         const float scale = axis.relativeScale(q.at(x, y));
         if (const auto of = around.bends()) {
@@ -166,9 +165,9 @@ Measured measure(const Image<float>& values, const Image<float>& q, const DepthA
 /// The steps of depth that is stored in few values.
 class DepthSteps {
   public:
-    explicit DepthSteps(const Image<float>& q) {
+    DepthSteps(const Image<float>& q, const NoiseGrid& grid) {
         std::vector<float> all;
-        NoiseGrid(q).forEach(q, [&](int x, int y) { all.push_back(q.at(x, y)); });
+        grid.forEach(q, [&](int x, int y) { all.push_back(q.at(x, y)); });
         std::ranges::sort(all);
         std::vector<std::size_t> pixels;
         for (const float value : all) {
@@ -294,27 +293,35 @@ std::optional<double> meanOfRows(const std::vector<double>& sums,
 }
 
 float depthNoise(const Image<float>& q, const DepthAxis& axis) {
-    const float plain = measure(q, q, axis).noise;
-    const DepthSteps steps(q);
+    const NoiseGrid grid = NoiseGrid::of(q);
+    const float plain = measure(q, q, grid, axis).noise;
+    const DepthSteps steps(q, grid);
     if (steps.none()) return plain;
     // In steps, one in twenty bends is 0 or a whole step whatever the noise. So each value is
     // spread evenly over its step, and what steps alone would give then is measured, too: the
     // rounding of depth and the spread, each even over a step, on a plane.
-    Image<float> spread = q, rounding(q.width(), q.height());
     const float plane = 4.0f * steps.widest();
-    const NoiseGrid grid(q);
-    for (int y = 0; y < q.height(); ++y) {
-        if (!grid.needs(y)) continue;
+    // Only the rows that are looked at, each between the two above and the two below it, as far as
+    // Around looks.
+    constexpr int kReach = 2, kGroup = 2 * kReach + 1;
+    const int looked = (q.height() - 2 - grid.first) / grid.rows + 1;
+    const NoiseGrid ofRows{kReach, kGroup, grid.columns};
+    Image<float> rows(q.width(), kGroup * looked), spread = rows, rounding = rows;
+    for (int row = 0; row < rows.height(); ++row) {
+        const int y = grid.first + row / kGroup * grid.rows + row % kGroup - kReach;
+        if (y < 0 || y >= q.height()) continue;
         for (int x = 0; x < q.width(); ++x) {
             const float here = q.at(x, y);
             if (!(here > 0.0f)) continue;
             const auto pixel = static_cast<std::uint64_t>(y) * q.width() + x;
             const float width = steps.at(here), added = width * evenlySpread(2 * pixel);
-            spread.at(x, y) = here + added;
-            rounding.at(x, y) = plane + added + width * evenlySpread(2 * pixel + 1);
+            rows.at(x, row) = here;
+            spread.at(x, row) = here + added;
+            rounding.at(x, row) = plane + added + width * evenlySpread(2 * pixel + 1);
         }
     }
-    const Measured all = measure(spread, q, axis), ofSteps = measure(rounding, q, axis);
+    const Measured all = measure(spread, rows, ofRows, axis),
+                   ofSteps = measure(rounding, rows, ofRows, axis);
     if (all.noise < kAboveSteps * ofSteps.noise ||
         all.everywhere < kAboveSteps * ofSteps.everywhere)
         return plain;

@@ -22,8 +22,8 @@ inline constexpr float kDoubt = 2.0f;
 /// How noisy the depth of a view is: the standard deviation of what each pixel has of its own, as a
 /// share of q; 0 when nothing can be told. `q` is as in PreparedPage. From second differences along
 /// four directions: at edges and creases one of them runs along the edge, noise is in all. Of depth
-/// in steps (disparities of a Kinect, millimetres) noise of more than about a step, or what is seen
-/// of less; exact depth in steps has none.
+/// in steps (disparities of a Kinect, millimetres) noise of more than about two steps, or what is
+/// seen of less; exact depth in steps has none.
 [[nodiscard]] float depthNoise(const Image<float>& q, const DepthAxis& axis);
 
 /// Whether there is more noise than a code's rounding. `noise` is depthNoise().

@@ -24,6 +24,8 @@ glm::dquat turnOf(glm::dvec3 vector) {
 /// Fewer views are too few to tell whether moves of neighbours are alike: of 8 that moved each by
 /// its own, the share that neighbours seem to tell is 0 to 0.2.
 constexpr std::size_t kFewestViews = 8;
+/// So many views tell how alike moves are: all of thousands would take seconds.
+constexpr std::size_t kMostLeftOut = 128;
 /// Cameras this close are one: what rounding leaves between a view's camera and that of a file, as
 /// MovedCamera::distance and radians.
 constexpr double kSameCamera = 1e-6;
@@ -68,19 +70,20 @@ MovesOfNeighbours::MovesOfNeighbours(std::vector<MovedCamera> views) : views_(st
         return glm::dot(shift, shift) / (distance * distance) + glm::dot(turn, turn);
     };
     double all = 0, left = 0;
-    std::vector<double> nearest(views_.size());
-    for (std::size_t i = 0; i < views_.size(); ++i) {
+    std::vector<double> nearest;
+    const std::size_t step = (views_.size() + kMostLeftOut - 1) / kMostLeftOut;
+    for (std::size_t i = 0; i < views_.size(); i += step) {
         const MovedCamera& view = views_[i];
         Camera given = view.camera;
         given.position -= view.move.shift;
         given.orientation = glm::conjugate(view.move.turn) * given.orientation;
         const Mean others = meanFor(given, i);
-        nearest[i] = others.nearest;
+        nearest.push_back(others.nearest);
         const glm::dvec3 turn = vectorOf(view.move.turn);
         all += size(view.move.shift, turn, view.distance);
         left += size(view.move.shift - others.shift, turn - others.turn, view.distance);
     }
-    share_ = std::clamp(1 - left / all, 0.0, 1.0);
+    if (all > 0) share_ = std::clamp(1 - left / all, 0.0, 1.0);
     const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
     std::ranges::nth_element(nearest, middle);
     usualGap_ = *middle;

@@ -134,7 +134,8 @@ CandidateView candidateOf(const ReferenceView& view, double noise) {
 
 ViewSamples samplesOfView(const ReferenceView& view, std::size_t number, std::int64_t stride,
                           const SurfaceAt& surface) {
-    ViewSamples all, sure;
+    ViewSamples out;
+    std::vector<bool> sure;
     std::int64_t seen = static_cast<std::int64_t>(number) * 7919 % stride;
     for (int y = 0; y < view.depth.height(); ++y) {
         for (int x = 0; x < view.depth.width(); ++x) {
@@ -147,13 +148,22 @@ ViewSamples samplesOfView(const ReferenceView& view, std::size_t number, std::in
             s.normal =
                 view.camera.orientation * planeNormal(view.camera, x, y, point.w, point.gradient);
             const glm::dvec2 spacing = view.camera.sampleSpacing(point.dist);
-            const double density = 1 / (spacing.x * spacing.y);
-            all.add(s, density);
-            if (point.sure) sure.add(s, density);
+            out.samples.push_back(s);
+            out.ownDensity.push_back(1 / (spacing.x * spacing.y));
+            sure.push_back(point.sure);
         }
     }
     // What is off by much is seen by no other view, and would weigh as much as all that it hides.
-    return sure.samples.size() >= kSureShare * all.samples.size() ? sure : all;
+    const auto count = static_cast<std::size_t>(std::ranges::count(sure, true));
+    if (count == sure.size() || count < kSureShare * static_cast<double>(sure.size())) return out;
+    for (std::size_t i = 0, to = 0; i < sure.size(); ++i) {
+        if (!sure[i]) continue;
+        out.samples[to] = out.samples[i];
+        out.ownDensity[to++] = out.ownDensity[i];
+    }
+    out.samples.resize(count);
+    out.ownDensity.resize(count);
+    return out;
 }
 
 namespace {

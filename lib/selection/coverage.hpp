@@ -72,11 +72,6 @@ struct SeenSample {
 struct ViewSamples {
     std::vector<SurfaceSample> samples;  ///< without their areas
     std::vector<double> ownDensity;      ///< of each: with which its view samples it, squared
-
-    void add(const SurfaceSample& sample, double density) {
-        samples.push_back(sample);
-        ownDensity.push_back(density);
-    }
 };
 /// At a pixel with a point.
 using SurfaceAt = std::function<SurfacePoint(int x, int y)>;

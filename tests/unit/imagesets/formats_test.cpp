@@ -348,12 +348,17 @@ std::string transformsJson(const Camera& c, const std::string& extra) {
         c.width, c.height, c.fx, c.fy, c.cx, c.cy, extra, rows);
 }
 
+/// The files that transformsJson() names: depth in millimetres.
+void writeMillimetres(const TemporaryFolder& folder, const ReferenceView& view) {
+    writeColour(folder / "a.png", view);
+    writeCodes(folder / "d.png", 96, 64, 16,
+               [&](int x, int y) { return std::lround(view.depth.at(x, y) * 1000); });
+}
+
 TEST(Transforms, MillimetresAndNamesWithoutAnEnding) {
     const auto views = roomViews(1);
     TemporaryFolder folder;
-    writeColour(folder / "a.png", views[0]);
-    writeCodes(folder / "d.png", 96, 64, 16,
-               [&](int x, int y) { return std::lround(views[0].depth.at(x, y) * 1000); });
+    writeMillimetres(folder, views[0]);
     writeText(folder / "transforms.json", transformsJson(views[0].camera, ""));
     const auto read = readSet(folder.path());
     ASSERT_TRUE(read) << read.error().text();
@@ -364,9 +369,7 @@ TEST(Transforms, MillimetresAndNamesWithoutAnEnding) {
 TEST(Transforms, WithoutTheSizeTakeThePicturesNearTheMiddle) {
     const auto views = roomViews(1);
     TemporaryFolder folder;
-    writeColour(folder / "a.png", views[0]);
-    writeCodes(folder / "d.png", 96, 64, 16,
-               [&](int x, int y) { return std::lround(views[0].depth.at(x, y) * 1000); });
+    writeMillimetres(folder, views[0]);
     std::string text = transformsJson(views[0].camera, "");
     text.replace(text.find("\"w\":96,\"h\":64,"), 14, "");
     writeText(folder / "transforms.json", text);

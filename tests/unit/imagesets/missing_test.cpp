@@ -30,14 +30,19 @@ void expectTwoOfThree(const std::filesystem::path& set, const std::string& gone)
     EXPECT_NE(strict.error().text().find(gone), std::string::npos) << strict.error().text();
 }
 
-TEST(MissingFiles, OfTransformsLeaveTheirViewOut) {
+/// A set of three views: v0, v1 and v2.
+std::filesystem::path writeTransforms(const TemporaryFolder& folder) {
     Bundle bundle;
     bundle.views = roomViews(3);
-    for (std::size_t i = 0; i < 3; ++i) bundle.views[i].name = fmt::format("v{}", i);
-    TemporaryFolder folder;
     Job job;
-    const auto set = folder / "set";
-    ASSERT_TRUE(exportViews(*viewsOf(bundle), set, {}, job));
+    auto set = folder / "set";
+    EXPECT_TRUE(exportViews(*viewsOf(bundle), set, {}, job));
+    return set;
+}
+
+TEST(MissingFiles, OfTransformsLeaveTheirViewOut) {
+    TemporaryFolder folder;
+    const auto set = writeTransforms(folder);
     std::filesystem::remove(set / "images/v1.png");
     expectTwoOfThree(set, "v1.png");
     std::filesystem::remove(set / "images/v0.png");
@@ -47,13 +52,9 @@ TEST(MissingFiles, OfTransformsLeaveTheirViewOut) {
 
 /// Frames that name no depth are left out as those are whose files are missing.
 TEST(MissingFiles, FramesOfTransformsWithoutDepthAreLeftOut) {
-    Bundle bundle;
-    bundle.views = roomViews(3);
-    for (std::size_t i = 0; i < 3; ++i) bundle.views[i].name = fmt::format("v{}", i);
     TemporaryFolder folder;
     Job job;
-    const auto set = folder / "set";
-    ASSERT_TRUE(exportViews(*viewsOf(bundle), set, {}, job));
+    const auto set = writeTransforms(folder);
     const auto bytes = readFile(set / "transforms.json", job.limits);
     ASSERT_TRUE(bytes);
     std::string text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
@@ -114,11 +115,7 @@ TEST(MissingFiles, OfRecordingsLeaveTheirViewOut) {
 /// Writes a set of three views, and takes the depth of all pixels of some away.
 std::filesystem::path writeSetWithDarkViews(const TemporaryFolder& folder,
                                             std::initializer_list<int> dark) {
-    Bundle bundle;
-    bundle.views = roomViews(3);
-    Job job;
-    auto set = folder / "set";
-    EXPECT_TRUE(exportViews(*viewsOf(bundle), set, {}, job));
+    auto set = writeTransforms(folder);
     for (const int i : dark)
         writeExr(set / fmt::format("depth/v{}.exr", i), {{"Z", Image<float>(96, 64, 0.0f)}});
     return set;
