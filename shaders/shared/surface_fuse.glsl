@@ -62,12 +62,12 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
         if (isBackground(self, ivec2(floor(at - 0.5f)), level)) return true;
         silhouette = level < kSolidAlpha;
     }
-    Facet facet = facetOf(self, x, y, q);
     int votes = 0, enough = kWholeVote * (nearEdge ? kVotesNearEdge : kVotesElsewhere);
     uint others = 0u;  // do not show it
     uint guesses = 0u;  // show it by an extension
     uint closelyBehind = 0u;  // show something there, and not by an extension
     bool guess = (flags & kExtensionBit) != 0u;
+    Facet facet = facetOf(self, x, y, q, !guess);
     bool outermost = guess && beyondCentres(self, x, y, q);
     float within = sameWithin(q), close = kLinkedSamples * relativeScale(frameAxis(), q);
     // Four at a time: llvmpipe ends all loops of a thread together after 65535 rounds.

@@ -135,10 +135,12 @@ struct Facet {
     float perUnit;  // how much q changes over a scene unit
     float off;      // how far in front of it noise may put a point of it
     float edgeOn;   // seen this small or smaller, as a share of its own pixel, it is seen edge on
+    float behind;   // and so far behind it background must be, pixels of who sees it edge on
 };
 
-// The one that a source shows at the point (x, y, q) of the frame.
-Facet facetOf(int s, float x, float y, float q) {
+// The one that a source shows at the point (x, y, q) of the frame. `measured`: between the middles of its
+// pixels, not by an extension.
+Facet facetOf(int s, float x, float y, float q, bool measured) {
     vec4 h = warp(s, x, y, q);
     float inverse = 1.0f / h.w, p = h.z * inverse;
     vec2 at = vec2(h.x, h.y) * inverse;
@@ -171,7 +173,9 @@ Facet facetOf(int s, float x, float y, float q) {
     facet.perUnit = qPerUnit(axisOf(s), p);
     // Noise tilts facets, and puts points in front of them.
     facet.off = kBehindNoises * (clearlyBehindOf(s) - kClearlyBehind) * relativeScale(axisOf(s), p);
-    facet.edgeOn = kEdgeOn + facet.off / (facet.perUnit * texel);
+    float slope = length(g) / (facet.perUnit * texel);
+    facet.edgeOn = kEdgeOn * (measured ? sqrt(1.0f + slope * slope) : 1.0f) + facet.off / (facet.perUnit * texel);
+    facet.behind = measured ? kBehindMeasured : kBehindTexel;
     return facet;
 }
 
@@ -198,7 +202,7 @@ bool beyondCentres(int s, float x, float y, float q) {
 // that is its pixels tell to a part of one only: it must see past what is so far behind the point, too.
 bool seesEdgeOn(int s, IN(Facet) facet, vec4 h) { return facet.any && sizeIn(s, facet, h) < facet.edgeOn; }
 vec4 behindFacet(int s, IN(Facet) facet, vec4 h) {
-    float behind = kBehindTexel * texelAt(s, h.z / h.w) * facet.perUnit + facet.off;
+    float behind = facet.behind * texelAt(s, h.z / h.w) * facet.perUnit + facet.off;
     return h - warpChange(s, facet.into) * behind;
 }
 

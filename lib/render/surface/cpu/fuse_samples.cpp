@@ -226,6 +226,7 @@ struct SampleFuser {
         for (std::int32_t& k : owners) k = pixel.owner[k];
         Facets facets;
         facets.owners = owners;
+        facets.extensions = lanesOf(hn::And(asked, flagged(q, kExtensionBit)));
         Opinions opinions;
         opinions.against = hn::Zero(di);
         opinions.enough = hn::IfThenElse(hn::RebindMask(di, nearEdge),

@@ -444,11 +444,12 @@ HWY_INLINE Counts votesAt(shared::Votes& votes, const VotingSource& from, int s,
 /// The facets of points. Each is found when it is first asked for.
 struct Facets {
     const std::int32_t* owners;  ///< who shows each
+    std::uint32_t extensions;    ///< lanes that are shown by one
     std::uint32_t known = 0;     ///< lanes
     shared::Votes::Facet of[kMostPoints];
 
     const shared::Votes::Facet& at(shared::Votes& votes, int l, float x, float y, float q) {
-        if (!(known >> l & 1u)) of[l] = votes.facetOf(owners[l], x, y, q);
+        if (!(known >> l & 1u)) of[l] = votes.facetOf(owners[l], x, y, q, !(extensions >> l & 1u));
         known |= 1u << l;
         return of[l];
     }
