@@ -8,6 +8,7 @@
 #include "formats/meshes/readers.hpp"
 #include "formats/meshes/scene_claims.hpp"
 #include "formats/meshes/side_files.hpp"
+#include "formats/meshes/stl_colours.hpp"
 #include "formats/meshes/text_coordinates.hpp"
 #include "formats/meshes/triangulate.hpp"
 #include "formats/meshes/vertex_colours.hpp"
@@ -373,7 +374,9 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         request.putText(fmt::format("{}.{}", stem, endingOf(format)));
         (void)process->send(Tag::readModel, request.bytes);
         SideFiles side(files);
-        STX_TRY(const auto scene, hear(*process, format, side, limits));
+        STX_TRY(auto scene, hear(*process, format, side, limits));
+        if (format == AssimpFormat::stl && scene.meshes.size() == 1)
+            readStlColours(bytes, scene.meshes[0].colours);
         if (!side.missing().empty() && side.texts().empty())
             files.job().note(
                 fmt::format("material file {}; its materials have no colour", side.missing()));
