@@ -359,10 +359,10 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
     if (format == AssimpFormat::fbx) STX_CHECK(checkFbxClaims(bytes, limits));
     if (format == AssimpFormat::stl) STX_CHECK(checkStlEnd(bytes));
     try {
-        std::optional<ShiftedText> shifted;
-        if (format == AssimpFormat::obj) shifted = shiftLargeCoordinates(bytes, "v");
-        if (format == AssimpFormat::stl) shifted = shiftLargeCoordinates(bytes, "vertex");
-        if (shifted) bytes = shifted->text;
+        std::optional<PlainText> plain;
+        if (format == AssimpFormat::obj) plain = plainCoordinates(bytes, "v");
+        if (format == AssimpFormat::stl) plain = plainCoordinates(bytes, "vertex");
+        if (plain) bytes = plain->text;
         DecoderBounds bounds;
         bounds.memoryBytes = limits.maxMemoryBytes + kSanitizerBytes;
         bounds.cpuSeconds = kMostModelSeconds;
@@ -380,8 +380,7 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         if (!side.missing().empty() && side.texts().empty())
             files.job().note(
                 fmt::format("material file {}; its materials have no colour", side.missing()));
-        return SceneConverter(scene, format, files, side,
-                              shifted ? shifted->origin : glm::dvec3(0.0))
+        return SceneConverter(scene, format, files, side, plain ? plain->origin : glm::dvec3(0.0))
             .convert();
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::failed, "the model needs more memory than there is");

@@ -1,3 +1,4 @@
+#include <array>
 #include <cstdlib>
 #include <fstream>
 
@@ -54,6 +55,29 @@ TEST(Mtl, AlphaMapIsTheAlphaOfTheTexture) {
     EXPECT_EQ(alone.mesh.textures.at(plain.baseColourTexture).pixels.at(1, 0),
               glm::u8vec4(255, 255, 255, 128));
     EXPECT_EQ(plain.baseColour, glm::vec4(0, 0, 1, 1));
+}
+
+/// A triangle of three corners with `first`, then one with `second` behind the coordinates.
+std::array<glm::vec4, 2> coloursOfTwo(const std::string& first, const std::string& second) {
+    std::string text;
+    for (int i = 0; i < 6; ++i)
+        text += fmt::format("v {} {} {} {}\n", i % 3 / 2, i % 3 % 2, i / 3, i < 3 ? first : second);
+    const auto model = readGoodText(text + "f 1 2 3\nf 4 5 6\n", "a.obj");
+    EXPECT_TRUE(model.notes.empty()) << model.notes[0];
+    EXPECT_EQ(model.mesh.triangles.size(), 2u);
+    const MaterialSampler sampler(model.mesh);
+    return {sampler.colour(0, glm::vec3(1.0f / 3.0f)), sampler.colour(1, glm::vec3(1.0f / 3.0f))};
+}
+
+TEST(Obj, VerticesWithoutAColourAreWhiteBesideColoured) {
+    const glm::vec4 white(1), green(0, 1, 0, 1), blue(0, 0, 1, 1);
+    using Two = std::array<glm::vec4, 2>;
+    EXPECT_EQ(coloursOfTwo("", "0 1 0"), (Two{white, green}));
+    EXPECT_EQ(coloursOfTwo("0 1 0", ""), (Two{green, white}));
+    EXPECT_EQ(coloursOfTwo("1", "0 0 1"), (Two{white, blue})) << "a w";
+    EXPECT_EQ(coloursOfTwo("0 0 255", ""), (Two{blue, white})) << "bytes";
+    EXPECT_EQ(coloursOfTwo("0 0 1", "0 1 0"), (Two{blue, green}));
+    EXPECT_EQ(coloursOfTwo("# plain", "0 1 0"), (Two{white, green})) << "a comment";
 }
 
 TEST(Mtl, ScaleAndOffsetOfATextureMoveItsCoordinates) {
