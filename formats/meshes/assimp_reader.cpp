@@ -34,6 +34,8 @@ const char* endingOf(AssimpFormat format) {
 using decoders::Tag;
 using models::TextureUse;
 
+/// Assimp's name of the material of what has none.
+constexpr std::string_view kUnnamed = "DefaultMaterial";
 constexpr int kMostModelSeconds = 120;
 #ifdef __SANITIZE_ADDRESS__
 /// AddressSanitizer waits for ever where it has no memory to say that there is none.
@@ -52,11 +54,14 @@ class SceneConverter {
           builder_(files.job()),
           materialFolder_(side.materialFolder()) {
         for (const auto& text : side.texts()) scanMtl(text, mtl_);
+        saysUndefined_ = format == AssimpFormat::obj && !files.replacesColour() &&
+                         (side.missing().empty() || !side.texts().empty());
         builder_.setOrigin(origin);
     }
 
     Result<Mesh> convert() {
         for (const auto& material : scene_.materials) STX_CHECK(convertMaterial(material));
+        if (saysUndefined_) noteUndefined();
         if (builder_.materials().empty()) {
             builder_.materials().push_back({.name = "default", .hasColour = false});
             mtlOf_.emplace_back();
@@ -136,6 +141,21 @@ class SceneConverter {
         mtlOf_.push_back(mtl);
         return {};
     }
+    /// Materials that a `usemtl` names and no material file has.
+    void noteUndefined() {
+        std::vector<std::string> names;
+        for (const auto& material : scene_.materials)
+            if (material.name != kUnnamed && !mtl_.contains(material.name))
+                names.push_back(material.name);
+        if (names.empty()) return;
+        const bool one = names.size() == 1;
+        files_.job().note(fmt::format(
+            "{} in no material file; {} no colour",
+            one ? fmt::format("material '{}' is", names[0])
+                : fmt::format("{} materials, '{}' the first, are", names.size(), names[0]),
+            one ? "it has" : "they have"));
+    }
+
 
     /// map_d becomes the alpha of the base colour texture.
     Result<void> addAlphaMap(const ForeignScene::Material& source, Material& m) {
@@ -301,6 +321,7 @@ class SceneConverter {
     std::map<std::string, MtlMaterial> mtl_;
     std::vector<MtlMaterial> mtlOf_;  ///< of each material
     std::string materialFolder_;
+    bool saysUndefined_ = false;  ///< nothing has been said of materials without a file
     std::size_t lines_ = 0, points_ = 0;
 };
 

@@ -80,6 +80,14 @@ TEST(Obj, VerticesWithoutAColourAreWhiteBesideColoured) {
     EXPECT_EQ(coloursOfTwo("# plain", "0 1 0"), (Two{white, green})) << "a comment";
 }
 
+TEST(Obj, MaterialsThatNoFileHasAreSaidOnce) {
+    const std::string triangles =
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\nusemtl a\nf 3 2 1\n";
+    const auto notes = readGoodText(triangles, "a.obj").notes;
+    ASSERT_EQ(notes.size(), 2u) << "and that the model has no colour";
+    EXPECT_EQ(notes[0], "2 materials, 'a' the first, are in no material file; they have no colour");
+}
+
 TEST(Mtl, ScaleAndOffsetOfATextureMoveItsCoordinates) {
     TemporaryFolder folder;
     writePair(folder / "t.png", {255, 0, 0, 255}, {0, 255, 0, 255});
