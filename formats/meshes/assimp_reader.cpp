@@ -119,8 +119,7 @@ class SceneConverter {
             m.alpha = Material::Alpha::blend;
         }
         for (const auto& option : mtl.droppedOptions)
-            files_.job().note(
-                fmt::format("material '{}': option {} of map_Kd is dropped", m.name, option));
+            files_.job().note(fmt::format("material '{}': option {} is dropped", m.name, option));
 
         if (hasMap && !files_.replacesColour()) {
             STX_TRY(m.baseColourTexture, texture(source, Use::diffuse));
@@ -141,6 +140,7 @@ class SceneConverter {
         mtlOf_.push_back(mtl);
         return {};
     }
+
     /// Materials that a `usemtl` names and no material file has.
     void noteUndefined() {
         std::vector<std::string> names;
@@ -155,7 +155,6 @@ class SceneConverter {
                 : fmt::format("{} materials, '{}' the first, are", names.size(), names[0]),
             one ? "it has" : "they have"));
     }
-
 
     /// map_d becomes the alpha of the base colour texture.
     Result<void> addAlphaMap(const ForeignScene::Material& source, Material& m) {
@@ -321,8 +320,8 @@ class SceneConverter {
     std::map<std::string, MtlMaterial> mtl_;
     std::vector<MtlMaterial> mtlOf_;  ///< of each material
     std::string materialFolder_;
-    bool saysUndefined_ = false;  ///< nothing has been said of materials without a file
     std::size_t lines_ = 0, points_ = 0;
+    bool saysUndefined_ = false;  ///< nothing has been said of materials without a file
 };
 
 /// What the process `of` says of the model that it was asked for.

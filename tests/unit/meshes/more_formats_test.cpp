@@ -80,6 +80,54 @@ TEST(Obj, VerticesWithoutAColourAreWhiteBesideColoured) {
     EXPECT_EQ(coloursOfTwo("# plain", "0 1 0"), (Two{white, green})) << "a comment";
 }
 
+TEST(Mtl, OneValueIsAllThree) {
+    TemporaryFolder folder;
+    const auto grey = objWith(folder, "Kd 0.5\n");
+    expectNear(glm::vec3(colourOf(grey.mesh)), glm::vec3(0.5f), 1e-4f);
+    expectNear(glm::vec3(colourOf(objWith(folder, "Kd 0\nKe 0.25 # dim\n").mesh)), glm::vec3(0.25f),
+               1e-4f);
+    expectNear(glm::vec3(colourOf(objWith(folder, "Kd 0 1 0\r\n").mesh)), glm::vec3(0, 1, 0),
+               1e-4f);
+}
+
+TEST(Mtl, HaloIsLeftOut) {
+    TemporaryFolder folder;
+    const auto model = objWith(folder, "Kd 1 0 0\nd -halo 0.25\n");
+    EXPECT_TRUE(model.hasNote("material 'paint': option -halo of d is dropped"));
+    EXPECT_FLOAT_EQ(colourOf(model.mesh).a, 0.25f);
+    EXPECT_EQ(objWith(folder, "Kd 1 0 0\nd 0.5\n").notes.size(), 0u);
+}
+
+TEST(Mtl, SeveralFilesOnALine) {
+    TemporaryFolder folder;
+    write(folder / "one.mtl", "newmtl red\nKd 1 0 0");
+    write(folder / "two b.mtl", "newmtl green\nKd 0 1 0\n");
+    write(folder / "all of it.mtl x.mtl", "newmtl red\nKd 0 0 1\nnewmtl green\nKd 0 0 1\n");
+    const auto coloursWith = [&](const std::string& names) {
+        write(folder / "a.obj", "mtllib " + names +
+                                    "\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n"
+                                    "v 0 0 1\nv 1 0 1\nv 0 1 1\nusemtl green\nf 4 5 6\n");
+        const auto model = readGood(folder / "a.obj");
+        std::string colours;
+        for (std::uint32_t i = 0; i < 2; ++i) {
+            const auto c = MaterialSampler(model.mesh).colour(i, glm::vec3(1.0f / 3.0f));
+            const bool grey = c.r > 0 && c.r < 1;
+            colours += grey ? "grey " : fmt::format("{}{}{} ", c.r, c.g, c.b);
+        }
+        return colours + (model.notes.empty() ? "" : model.notes[0]);
+    };
+    EXPECT_EQ(coloursWith("one.mtl two b.mtl"), "100 010 ");
+    EXPECT_EQ(coloursWith("two b.mtl  \tone.mtl"), "100 010 ");
+    EXPECT_EQ(coloursWith("all of it.mtl x.mtl"), "001 001 ") << "one name that is there";
+    EXPECT_EQ(coloursWith("one.mtl"),
+              "100 111 material 'green' is in no material file; it has no colour");
+    EXPECT_EQ(coloursWith("gone.mtl one.mtl"),
+              "100 111 material 'green' is in no material file; it has no colour");
+    EXPECT_EQ(coloursWith("gone.mtl lost.mtl"),
+              "grey grey material file 'gone.mtl lost.mtl' cannot be read; its materials have no "
+              "colour");
+}
+
 TEST(Obj, MaterialsThatNoFileHasAreSaidOnce) {
     const std::string triangles =
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\nusemtl a\nf 3 2 1\n";
