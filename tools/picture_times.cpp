@@ -32,14 +32,40 @@ Result<std::vector<double>> parseTimes(const std::string& text) {
                 text);
 }
 
-/// A rate as the nearest fraction that films have.
-std::pair<int, int> rateOf(double rate) {
-    for (const int denominator : {1, 1001, 1000}) {
-        const double numerator = rate * denominator;
-        if (std::abs(numerator - std::round(numerator)) < 1e-4 * numerator)
-            return {static_cast<int>(std::round(numerator)), denominator};
-    }
-    return {static_cast<int>(std::clamp(std::round(rate * 1000), 1.0, 1e6)), 1000};
+/// The simplest fraction between two numbers above 0, by their continued fractions.
+std::pair<double, double> simplestBetween(double low, double high) {
+    const double whole = std::floor(low);
+    if (whole == low && whole > 0) return {whole, 1};
+    if (whole + 1 <= high) return {whole + 1, 1};
+    const auto [top, bottom] = simplestBetween(1 / (high - whole), 1 / (low - whole));
+    return {whole * top + bottom, top};
+}
+
+/// A rate as a fraction: a whole number, that of a film for television (24000/1001), or the
+/// simplest that is no farther off than the share `exact` of it.
+std::pair<int, int> rateOf(double rate, double exact) {
+    // Of a rate: what 23.976, 29.97 and 59.94 are off, 1e-6, and single precision.
+    constexpr double kWritten = 3e-6;
+    exact = std::max(exact, kWritten);
+    const double whole = std::round(rate), television = std::round(rate * 1.001);
+    if (whole >= 1 && std::abs(rate - whole) <= exact * rate) return {static_cast<int>(whole), 1};
+    if (television >= 1 && std::abs(rate * 1.001 - television) <= exact * rate)
+        return {static_cast<int>(television * 1000), 1001};
+    const auto [top, bottom] = simplestBetween(rate * (1 - exact), rate * (1 + exact));
+    constexpr double kLargest = 1e9;
+    return {static_cast<int>(std::clamp(top, 1.0, kLargest)),
+            static_cast<int>(std::clamp(bottom, 1.0, kLargest))};
+}
+
+/// How far from it the rate of a steady film can be, as a share: its times are rounded, as those of
+/// milliseconds show, or written with some digits.
+double exactnessOf(const Timeline& line, double rate) {
+    // Seconds: six digits behind the point, or seven.
+    double off = 5e-7;
+    for (std::size_t i = 0; i < line.count(); ++i)
+        off = std::max(
+            off, std::abs(line.times[i] - line.times.front() - static_cast<double>(i) / rate));
+    return 2 * off / (line.times.back() - line.times.front());
 }
 
 }  // namespace
@@ -107,7 +133,7 @@ Result<std::vector<double>> timesOf(const TimeOptions& o, const Timeline& timeli
 }
 
 std::pair<int, int> streamRateOf(const Timeline& line, const char* what, Job& job) {
-    if (const double rate = line.rate(); rate > 0) return rateOf(rate);
+    if (const double rate = line.rate(); rate > 0) return rateOf(rate, exactnessOf(line, rate));
     const double mean =
         static_cast<double>(line.count() - 1) / (line.times.back() - line.times.front());
     double shortest = mean > 0 ? 1 / mean : 0, longest = shortest;
@@ -115,7 +141,8 @@ std::pair<int, int> streamRateOf(const Timeline& line, const char* what, Job& jo
         shortest = std::min(shortest, line.durationOf(i));
         longest = std::max(longest, line.durationOf(i));
     }
-    const auto written = rateOf(mean);
+    constexpr double kOfMean = 1e-4;  ///< a mean needs no more digits than people read
+    const auto written = rateOf(mean, kOfMean);
     job.note(
         fmt::format("{} last {:.4g} to {:.4g} s, and a stream has one rate: "
                     "the mean, {:.6g} frames a second, is written; --fps gives another",

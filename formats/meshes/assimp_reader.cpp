@@ -8,6 +8,7 @@
 #include "formats/meshes/readers.hpp"
 #include "formats/meshes/scene_claims.hpp"
 #include "formats/meshes/side_files.hpp"
+#include "formats/meshes/stl_colours.hpp"
 #include "formats/meshes/text_coordinates.hpp"
 #include "formats/meshes/triangulate.hpp"
 #include "formats/meshes/vertex_colours.hpp"
@@ -33,6 +34,8 @@ const char* endingOf(AssimpFormat format) {
 using decoders::Tag;
 using models::TextureUse;
 
+/// Assimp's name of the material of what has none.
+constexpr std::string_view kUnnamed = "DefaultMaterial";
 constexpr int kMostModelSeconds = 120;
 #ifdef __SANITIZE_ADDRESS__
 /// AddressSanitizer waits for ever where it has no memory to say that there is none.
@@ -51,11 +54,14 @@ class SceneConverter {
           builder_(files.job()),
           materialFolder_(side.materialFolder()) {
         for (const auto& text : side.texts()) scanMtl(text, mtl_);
+        saysUndefined_ = format == AssimpFormat::obj && !files.replacesColour() &&
+                         (side.missing().empty() || !side.texts().empty());
         builder_.setOrigin(origin);
     }
 
     Result<Mesh> convert() {
         for (const auto& material : scene_.materials) STX_CHECK(convertMaterial(material));
+        if (saysUndefined_) noteUndefined();
         if (builder_.materials().empty()) {
             builder_.materials().push_back({.name = "default", .hasColour = false});
             mtlOf_.emplace_back();
@@ -113,8 +119,7 @@ class SceneConverter {
             m.alpha = Material::Alpha::blend;
         }
         for (const auto& option : mtl.droppedOptions)
-            files_.job().note(
-                fmt::format("material '{}': option {} of map_Kd is dropped", m.name, option));
+            files_.job().note(fmt::format("material '{}': option {} is dropped", m.name, option));
 
         if (hasMap && !files_.replacesColour()) {
             STX_TRY(m.baseColourTexture, texture(source, Use::diffuse));
@@ -134,6 +139,21 @@ class SceneConverter {
         builder_.materials().push_back(std::move(m));
         mtlOf_.push_back(mtl);
         return {};
+    }
+
+    /// Materials that a `usemtl` names and no material file has.
+    void noteUndefined() {
+        std::vector<std::string> names;
+        for (const auto& material : scene_.materials)
+            if (material.name != kUnnamed && !mtl_.contains(material.name))
+                names.push_back(material.name);
+        if (names.empty()) return;
+        const bool one = names.size() == 1;
+        files_.job().note(fmt::format(
+            "{} in no material file; {} no colour",
+            one ? fmt::format("material '{}' is", names[0])
+                : fmt::format("{} materials, '{}' the first, are", names.size(), names[0]),
+            one ? "it has" : "they have"));
     }
 
     /// map_d becomes the alpha of the base colour texture.
@@ -301,6 +321,7 @@ class SceneConverter {
     std::vector<MtlMaterial> mtlOf_;  ///< of each material
     std::string materialFolder_;
     std::size_t lines_ = 0, points_ = 0;
+    bool saysUndefined_ = false;  ///< nothing has been said of materials without a file
 };
 
 /// What the process `of` says of the model that it was asked for.
@@ -358,10 +379,10 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
     if (format == AssimpFormat::fbx) STX_CHECK(checkFbxClaims(bytes, limits));
     if (format == AssimpFormat::stl) STX_CHECK(checkStlEnd(bytes));
     try {
-        std::optional<ShiftedText> shifted;
-        if (format == AssimpFormat::obj) shifted = shiftLargeCoordinates(bytes, "v");
-        if (format == AssimpFormat::stl) shifted = shiftLargeCoordinates(bytes, "vertex");
-        if (shifted) bytes = shifted->text;
+        std::optional<PlainText> plain;
+        if (format == AssimpFormat::obj) plain = plainCoordinates(bytes, "v");
+        if (format == AssimpFormat::stl) plain = plainCoordinates(bytes, "vertex");
+        if (plain) bytes = plain->text;
         DecoderBounds bounds;
         bounds.memoryBytes = limits.maxMemoryBytes + kSanitizerBytes;
         bounds.cpuSeconds = kMostModelSeconds;
@@ -373,12 +394,13 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         request.putText(fmt::format("{}.{}", stem, endingOf(format)));
         (void)process->send(Tag::readModel, request.bytes);
         SideFiles side(files);
-        STX_TRY(const auto scene, hear(*process, format, side, limits));
+        STX_TRY(auto scene, hear(*process, format, side, limits));
+        if (format == AssimpFormat::stl && scene.meshes.size() == 1)
+            readStlColours(bytes, scene.meshes[0].colours);
         if (!side.missing().empty() && side.texts().empty())
             files.job().note(
                 fmt::format("material file {}; its materials have no colour", side.missing()));
-        return SceneConverter(scene, format, files, side,
-                              shifted ? shifted->origin : glm::dvec3(0.0))
+        return SceneConverter(scene, format, files, side, plain ? plain->origin : glm::dvec3(0.0))
             .convert();
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::failed, "the model needs more memory than there is");

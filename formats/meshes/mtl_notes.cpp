@@ -1,7 +1,10 @@
 #include "formats/meshes/mtl_notes.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+
+#include <fmt/format.h>
 
 #include "formats/meshes/text_encoding.hpp"
 
@@ -28,18 +31,70 @@ void readVector(std::string_view text, std::string_view option, glm::vec2& to) {
     }
 }
 
+/// A line of an MTL text: its first word, and what is behind it.
+struct MtlLine {
+    std::string_view key, value;
+};
+
+MtlLine takeLine(std::string_view& text) {
+    const auto end = text.find('\n');
+    const auto line = trimmed(text.substr(0, end));
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    const auto blank = line.find_first_of(" \t");
+    if (blank == std::string_view::npos) return {line, {}};
+    return {line.substr(0, blank), trimmed(line.substr(blank))};
+}
+
+constexpr std::string_view kHalo = "-halo";
+
+bool hasHalo(const MtlLine& line) {
+    return line.key == "d" && line.value.starts_with(kHalo);
+}
+
 }  // namespace
+
+std::string plainMtl(std::string_view text) {
+    std::string out;
+    out.reserve(text.size());
+    while (!text.empty()) {
+        const auto before = text;
+        const auto line = takeLine(text);
+        const auto number = trimmed(line.value.substr(0, line.value.find('#')));
+        const bool colour =
+            line.key == "Kd" || line.key == "Ke" || line.key == "Ka" || line.key == "Ks";
+        if (colour && !number.empty() && std::ranges::none_of(number, isBlank))
+            out += fmt::format("{0} {1} {1} {1}\n", line.key, number);
+        else if (hasHalo(line))
+            out += fmt::format("d {}\n", trimmed(line.value.substr(kHalo.size())));
+        else
+            out += before.substr(0, before.size() - text.size());
+    }
+    return out;
+}
+
+std::vector<std::string> materialFilesIn(std::string_view line) {
+    std::vector<std::string> names;
+    const auto isEnd = [&](std::size_t at) {
+        constexpr std::string_view kEnding = ".mtl";
+        return at >= kEnding.size() && isBlank(line[at]) &&
+               std::ranges::equal(line.substr(at - kEnding.size(), kEnding.size()), kEnding, {},
+                                  [](char c) { return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c; });
+    };
+    std::size_t from = 0;
+    for (std::size_t at = 0; at <= line.size(); ++at) {
+        if (at < line.size() && !isEnd(at)) continue;
+        if (const auto name = trimmed(line.substr(from, at - from)); !name.empty())
+            names.emplace_back(name);
+        from = at;
+    }
+    return names;
+}
 
 void scanMtl(std::string_view text, std::map<std::string, MtlMaterial>& materials) {
     MtlMaterial* current = nullptr;
     while (!text.empty()) {
-        const auto end = text.find('\n');
-        const auto line = trimmed(text.substr(0, end));
-        text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-        const auto blank = line.find_first_of(" \t");
-        const auto key = line.substr(0, blank);
-        const auto value =
-            blank == std::string_view::npos ? std::string_view{} : trimmed(line.substr(blank));
+        const auto line = takeLine(text);
+        const auto& [key, value] = line;
         if (key == "newmtl") {
             current = &materials[std::string(value)];
         } else if (!current) {
@@ -48,6 +103,7 @@ void scanMtl(std::string_view text, std::map<std::string, MtlMaterial>& material
             current->hasDiffuse = true;
         } else if (key == "d") {
             current->hasDissolve = true;
+            if (hasHalo(line)) current->droppedOptions.push_back(fmt::format("{} of d", kHalo));
         } else if (key == "Ke") {
             current->hasEmission = true;
         } else if (key == "Tr") {
@@ -66,7 +122,7 @@ void scanMtl(std::string_view text, std::map<std::string, MtlMaterial>& material
             }
             for (const std::string_view option : {"-t ", "-mm ", "-boost "}) {
                 if (key == "map_Kd" && value.find(option) != std::string_view::npos)
-                    current->droppedOptions.emplace_back(trimmed(option));
+                    current->droppedOptions.push_back(fmt::format("{} of map_Kd", trimmed(option)));
             }
         }
     }

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/meshes/stl_colours.hpp"
+
 namespace stx {
 namespace {
 
@@ -139,11 +141,8 @@ Result<void> checkStlEnd(ByteSpan bytes) {
         return part;
     };
     const std::string head = text(0, std::min(bytes.size(), kTail));
-    // Binary files may begin with the word, too; their size follows from a count at byte 80.
-    std::uint32_t triangles = 0;
-    if (bytes.size() >= 84) std::memcpy(&triangles, bytes.data() + 80, 4);
-    const bool binary = bytes.size() == 84 + std::uint64_t{triangles} * 50;
-    if (binary || head.find("solid") == std::string::npos ||
+    // Binary files may begin with the word, too.
+    if (facetsOfBinaryStl(bytes) || head.find("solid") == std::string::npos ||
         head.find("facet") == std::string::npos)
         return {};
     const std::size_t size = std::min(bytes.size(), kTail);

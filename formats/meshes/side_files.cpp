@@ -1,6 +1,7 @@
 #include "formats/meshes/side_files.hpp"
 
 #include "formats/meshes/model_wire.hpp"
+#include "formats/meshes/mtl_notes.hpp"
 #include "formats/meshes/text_encoding.hpp"
 
 namespace stx {
@@ -38,23 +39,38 @@ bool SideFiles::exists(std::string_view name) {
 
 std::optional<Bytes> SideFiles::read(std::string_view name) {
     const auto file = relative(name);
-    const auto path = find(file);
-    if (!path) return std::nullopt;
+    std::optional<std::string> text;
+    if (const auto path = find(file)) {
+        text = readFound(file, *path);
+    } else {
+        for (const auto& each : materialFilesIn(file)) {
+            const auto one = files_.find(each);
+            if (!one) continue;
+            const auto more = readFound(each, *one);
+            if (!more) return std::nullopt;
+            text = text.value_or("") + *more + '\n';
+        }
+    }
+    if (!text) return std::nullopt;
+    return bytesOf(*text);
+}
+
+std::optional<std::string> SideFiles::readFound(const std::string& file,
+                                                const std::filesystem::path& path) {
     // Files that name their materials thousands of times: once read, all is known.
-    if (!opened_.insert(path->string()).second)
-        return bytesOf("# This file has been read already.\n");
-    auto bytes = readFile(*path, files_.job().limits);
+    if (!opened_.insert(path.string()).second) return "# This file has been read already.\n";
+    auto bytes = readFile(path, files_.job().limits);
     if (!bytes) {
         if (!error_) error_ = bytes.error().at(fmt::format("material file '{}'", file));
         return std::nullopt;
     }
     if (auto text = utf8FromMarked(*bytes)) *bytes = std::move(*text);
     if (texts_.empty()) {
-        const auto folder = path->parent_path().lexically_relative(files_.folder());
+        const auto folder = path.parent_path().lexically_relative(files_.folder());
         if (folder != ".") materialFolder_ = folder.generic_string();
     }
     texts_.emplace_back(reinterpret_cast<const char*>(bytes->data()), bytes->size());
-    return std::move(*bytes);
+    return plainMtl(texts_.back());
 }
 
 }  // namespace stx

@@ -16,7 +16,8 @@ class SideFiles {
     explicit SideFiles(ModelFiles& files) : files_(files) {}
 
     [[nodiscard]] bool exists(std::string_view name);
-    /// The bytes of one; nothing when it is not there.
+    /// The text of one as plainMtl() gives it; nothing when it is not there. Where a name is of
+    /// several files that are, as in `mtllib a.mtl b.mtl`, the text of all.
     [[nodiscard]] std::optional<Bytes> read(std::string_view name);
 
     /// A file that is there but cannot be read.
@@ -30,6 +31,8 @@ class SideFiles {
 
   private:
     std::optional<std::filesystem::path> find(const std::string& file);
+    std::optional<std::string> readFound(const std::string& file,
+                                         const std::filesystem::path& path);
 
     ModelFiles& files_;
     std::optional<Error> error_;

@@ -1,5 +1,6 @@
 #include "formats/meshes/text_coordinates.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <vector>
@@ -15,11 +16,9 @@ namespace {
 struct CoordinateLine {
     glm::dvec3 position{0.0};
     std::string_view rest;
+    bool coloured = false;  ///< the rest is r g b
+    double brightest = 0;   ///< of these
 };
-
-bool isBlank(char c) {
-    return c == ' ' || c == '\t';
-}
 
 bool takeNumber(std::string_view& text, double& value) {
     while (!text.empty() && isBlank(text.front())) text.remove_prefix(1);
@@ -44,6 +43,10 @@ std::optional<CoordinateLine> parse(std::string_view values) {
         line.position /= w;
         line.rest = {};
     }
+    double colour[3] = {};
+    auto numbers = line.rest;
+    line.coloured = std::ranges::all_of(colour, [&](double& c) { return takeNumber(numbers, c); });
+    if (line.coloured) line.brightest = *std::ranges::max_element(colour);
     return line;
 }
 
@@ -67,22 +70,30 @@ bool eachLine(std::string_view text, std::string_view keyword, const Visit& visi
 
 }  // namespace
 
-std::optional<ShiftedText> shiftLargeCoordinates(ByteSpan bytes, std::string_view keyword) {
+std::optional<PlainText> plainCoordinates(ByteSpan bytes, std::string_view keyword) {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     std::vector<glm::dvec3> positions;
+    std::size_t coloured = 0;
+    double brightest = 0;
     const bool understood = eachLine(text, keyword, [&](auto, const auto& values) {
         if (!values) return true;
         const auto line = parse(*values);
-        if (line) positions.push_back(line->position);
-        return line.has_value();
+        if (!line) return false;
+        positions.push_back(line->position);
+        coloured += line->coloured ? 1 : 0;
+        brightest = std::max(brightest, line->brightest);
+        return true;
     });
     if (!understood) return std::nullopt;
     const auto strays = findStrays(positions.size(), [&](std::uint64_t i) {
         return Piece{positions[i], positions[i]};
     });
-    ShiftedText out;
+    PlainText out;
     out.origin = originFor(strays.bounds);
-    if (out.origin == glm::dvec3(0.0)) return std::nullopt;
+    const bool mixed = coloured > 0 && coloured < positions.size();
+    if (out.origin == glm::dvec3(0.0) && !mixed) return std::nullopt;
+    // Colours are 0..1, or 0..255 as linearFromSrgbColours() finds.
+    const std::string_view white = brightest > 1 ? "255 255 255" : "1 1 1";
     out.text.reserve(text.size() + positions.size() * 8);
     const auto append = [&](std::string_view piece) {
         const auto* first = reinterpret_cast<const std::byte*>(piece.data());
@@ -95,7 +106,8 @@ std::optional<ShiftedText> shiftLargeCoordinates(ByteSpan bytes, std::string_vie
         }
         const auto parsed = *parse(*values);
         const glm::vec3 p(parsed.position - out.origin);
-        append(fmt::format("{} {} {} {} {}\n", keyword, p.x, p.y, p.z, parsed.rest));
+        const auto rest = mixed && !parsed.coloured ? white : parsed.rest;
+        append(fmt::format("{} {} {} {} {}\n", keyword, p.x, p.y, p.z, rest));
         return true;
     });
     return out;

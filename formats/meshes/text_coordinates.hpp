@@ -9,18 +9,21 @@
 
 namespace stx {
 
-/// A model's text with an origin subtracted from its coordinates.
-struct ShiftedText {
+/// A model's text whose lines of coordinates Assimp reads as they are meant.
+struct PlainText {
     Bytes text;
-    glm::dvec3 origin{0.0};
+    glm::dvec3 origin{0.0};  ///< is subtracted from the coordinates
 };
 
-/// Assimp reads coordinates as floats, which round those of maps (4000000.1 becomes
-/// 4000000). So the lines that begin with `keyword` ("v" of OBJ, "vertex" of
-/// STL) are read in double precision first, and where originFor() finds their coordinates too
-/// large, rewritten from that origin. Nothing when they are fine, or when a line is not understood
-/// (then Assimp says what is wrong with it).
-[[nodiscard]] std::optional<ShiftedText> shiftLargeCoordinates(ByteSpan text,
-                                                               std::string_view keyword);
+/// Rewrites the lines that begin with `keyword` ("v" of OBJ, "vertex" of STL) where Assimp would
+/// lose what they say:
+///  - It reads coordinates as floats, which round those of maps (4000000.1 becomes 4000000). So
+///    they are read in double precision first, and written from an origin where originFor() finds
+///    them too large.
+///  - It gives the k-th colour to the k-th vertex, also where vertices before it have none. So
+///    vertices without a colour become white when others have one.
+/// Nothing when all is fine, or when a line is not understood (then Assimp says what is wrong with
+/// it).
+[[nodiscard]] std::optional<PlainText> plainCoordinates(ByteSpan text, std::string_view keyword);
 
 }  // namespace stx

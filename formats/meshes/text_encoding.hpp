@@ -14,4 +14,9 @@ namespace stx {
 /// Without the blanks of ASCII at both ends.
 [[nodiscard]] std::string_view trimmed(std::string_view text);
 
+/// What is between the words of a line.
+[[nodiscard]] constexpr bool isBlank(char c) {
+    return c == ' ' || c == '\t';
+}
+
 }  // namespace stx

@@ -71,7 +71,7 @@ Result<std::vector<Camera>> orbitCameras(glm::dvec3 centre, double radius,
         return fail(ErrorCode::usage, "the sphere's radius is {:g}; a finite number is expected",
                     radius);
     const double distance =
-        orbit.distance > 0 ? orbit.distance : framingDistance(std::max(radius, 1e-9), s);
+        orbit.distance > 0 ? orbit.distance : framingDistance(radius > 0 ? radius : 1e-9, s);
     const glm::dquat toUp = rotationToUp(s.up);
     const bool whole = std::abs(orbit.arcRad) >= 2 * std::numbers::pi - 1e-9;
     const double steps = whole ? count : std::max(count - 1, 1);

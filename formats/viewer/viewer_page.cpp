@@ -71,7 +71,7 @@ Json startOfSingle(const Camera& c, double distance, double nearPlane) {
     j["up"] = listOf(upright ? up : c.orientation * glm::dvec3(0, 1, 0));
     j["fov"] = glm::degrees(2 * std::atan(0.5 * c.height / c.fy));
     j["centre"] = listOf(target);
-    j["radius"] = std::max(distance, 1e-9);
+    j["radius"] = distance > 0 ? distance : 1e-9;
     j["around"] = false;
     j["turn"] = std::atan(kSingleReach);
     return j;
@@ -81,7 +81,7 @@ Json startOfSingle(const Camera& c, double distance, double nearPlane) {
 /// one in their middle is.
 Result<Json> startOf(const std::vector<Camera>& cameras, const Bounds& bounds) {
     const glm::dvec3 centre = bounds.empty() ? glm::dvec3(0) : bounds.centre();
-    const double radius = bounds.empty() ? 1.0 : std::max(bounds.radius(), 1e-9);
+    const double radius = bounds.empty() ? 1.0 : bounds.radius() > 0 ? bounds.radius() : 1e-9;
     glm::dvec3 mean(0), middle(0);
     for (const Camera& c : cameras) {
         mean += c.forward();

@@ -57,7 +57,7 @@ void fitDepthRange(ReferenceView& view) {
     float nearest = points.nearest, farthest = std::max(points.farthest, 0.0f);
     // A flat object facing the camera still needs a range.
     if (nearest == farthest) {
-        const float slack = std::max(farthest * 1e-4f, 1e-6f);
+        const float slack = farthest > 0 ? farthest * 1e-4f : 1e-6f;
         nearest = std::max(0.0f, nearest - slack);
         farthest += slack;
     }

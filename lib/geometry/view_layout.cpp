@@ -167,7 +167,10 @@ BoundingSphere boundingSphere(const std::vector<glm::vec3>& points) {
 Result<Camera> frameCamera(glm::dvec3 direction, const ViewFraming& framing,
                            const std::vector<glm::vec3>& points, const BoundingSphere& sphere,
                            bool tight) {
-    const double radius = std::max(sphere.radius, 1e-6 * (1.0 + glm::length(sphere.centre)));
+    // Points at one place have no size: as floats round it, or the unit where that is 0.
+    constexpr double kRounding = 1e-6;
+    const double least = std::max(sphere.radius, kRounding * glm::length(sphere.centre));
+    const double radius = least > 0 ? least : kRounding;
     const double distance = radius / std::sin(framing.fovRad * 0.5);
     const glm::dvec3 eye = sphere.centre + direction * distance;
     STX_TRY(const auto orientation, lookAt(eye, sphere.centre, framing.up));

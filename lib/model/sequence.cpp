@@ -240,6 +240,14 @@ double halfTick(double tick, double time) {
     return std::min(tick, kCoarsest) / 2 + lostAt(time);
 }
 
+void Timeline::findTick() {
+    // Times of 120 frames a second in milliseconds are off by half of an eighth of a frame.
+    constexpr double kMostOfFrame = 0.2;
+    tick = 1.0 / timescale();
+    for (std::size_t i = 0; i + 1 < times.size(); ++i)
+        tick = std::min(tick, kMostOfFrame * durationOf(i));
+}
+
 std::size_t Timeline::frameAt(double time) const {
     const auto next = std::upper_bound(times.begin(), times.end(), time + slack(time));
     return next == times.begin() ? 0 : static_cast<std::size_t>(next - times.begin()) - 1;

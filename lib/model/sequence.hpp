@@ -34,8 +34,9 @@ struct Timeline {
     [[nodiscard]] double duration() const { return std::max(0.0, end - times.front()); }
     /// The slack of a time that is compared with these.
     [[nodiscard]] double slack(double time) const { return halfTick(tick, time); }
-    /// Takes as the tick that of timescale().
-    void findTick() { tick = 1.0 / timescale(); }
+    /// Takes as the tick that of timescale(), or a fifth of the shortest frame where that is less:
+    /// who asks for the middle of a frame means no other.
+    void findTick();
 
     [[nodiscard]] std::size_t count() const { return times.size(); }
     [[nodiscard]] bool moves() const { return times.size() > 1; }

@@ -151,7 +151,8 @@ class SceneWriter {
         if (bounds_.empty()) return;
         NodePtr viewpoint = makeNode("Viewpoint");
         const double angle = viewpoint->get<float>("fieldOfView");
-        const double away = std::max(bounds_.radius(), 1e-6) / std::sin(angle / 2);
+        const double radius = bounds_.radius() > 0 ? bounds_.radius() : 1e-6;
+        const double away = radius / std::sin(angle / 2);
         // From the rounded orientation: a bundle that was read gives the same bytes again.
         const glm::vec4 turn(axisAngleFromQuat(bundle_.views[0].camera.orientation));
         const glm::dvec3 back = quatFromAxisAngle(glm::dvec4(turn)) * glm::dvec3(0, 0, 1);

@@ -282,7 +282,7 @@ bool sameCamera(const Camera& a, const Camera& b) {
     };
     return a.width == b.width && a.height == b.height && a.orthographic == b.orthographic &&
            near(a.fx, b.fx) && near(a.fy, b.fy) && near(a.cx, b.cx) && near(a.cy, b.cy) &&
-           glm::length(a.position - b.position) <= 1e-9 * std::max(1.0, glm::length(a.position)) &&
+           glm::distance(a.position, b.position) <= 1e-9 * glm::length(a.position) &&
            std::abs(std::abs(glm::dot(a.orientation, b.orientation)) - 1.0) <= 1e-12;
 }
 

@@ -1,7 +1,10 @@
+#include <array>
+#include <cmath>
 #include <fstream>
 
 #include "formats/meshes/text_encoding.hpp"
 #include "formats/meshes/triangulate.hpp"
+#include "lib/capture/material_sampler.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/meshes/models.hpp"
 
@@ -69,6 +72,49 @@ TEST(TextEncoding, MarkedTextBecomesUtf8) {
     EXPECT_EQ(text(std::string("\xfe\xff\0v\x20\xac", 6)), "v\xe2\x82\xac");
     EXPECT_EQ(text(std::string("\xff\xfev\0\x3d\xd8\x00\xde", 8)), "v\xf0\x9f\x98\x80");
     EXPECT_EQ(text(std::string("\xff\xfe\x3d\xd8", 4)), "\xef\xbf\xbd");  // half a pair
+}
+
+/// A binary STL with a triangle for each attribute; the colours in sRGB bytes.
+std::vector<glm::ivec3> stlColours(const std::string& header,
+                                   const std::vector<std::uint16_t>& attributes) {
+    std::string text = header;
+    text.resize(80, ' ');
+    const auto append = [&](const auto& value) {
+        text.append(reinterpret_cast<const char*>(&value), sizeof(value));
+    };
+    append(static_cast<std::uint32_t>(attributes.size()));
+    float z = 0;
+    for (const auto attribute : attributes) {
+        append(std::array<float, 12>{0, 0, 1, 0, 0, z, 1, 0, z, 0, 1, z});
+        append(attribute);
+        z += 1;
+    }
+    const auto model = readGoodText(text, "a.stl");
+    EXPECT_EQ(model.mesh.triangles.size(), attributes.size());
+    std::vector<glm::ivec3> colours(attributes.size());
+    for (std::uint32_t i = 0; i < colours.size(); ++i) {
+        const auto c = MaterialSampler(model.mesh).colour(i, glm::vec3(1.0f / 3.0f));
+        for (int k = 0; k < 3; ++k) colours[i][k] = static_cast<int>(std::lround(255 * c[k]));
+    }
+    return colours;
+}
+
+// Colours of facets (Wikipedia, "STL (file format)"). Magics: an object's colour in the header; bit
+// 15 clear for a facet's own, red lowest. VisCAM: bit 15 set for a facet's own, blue lowest.
+TEST(Stl, ColoursOfFacets) {
+    const std::string magics("x COLOR=\0\xff\0\xff,MATERIAL=", 22);
+    using Colours = std::vector<glm::ivec3>;
+    const glm::ivec3 red(255, 0, 0), green(0, 255, 0), blue(0, 0, 255), plain(188);
+    EXPECT_EQ(stlColours(magics, {0x1f, 0x7c00, 0x8000, 0xffff}),
+              (Colours{red, blue, green, green}));
+    EXPECT_EQ(stlColours(magics, {0xffff, 0x8000}), (Colours{green, green}));
+    EXPECT_EQ(stlColours(magics, {0, 8 | 16 << 5 | 24 << 10}),
+              (Colours{glm::ivec3(0), glm::ivec3(66, 132, 197)}))
+        << "all five bits of each";
+    EXPECT_EQ(stlColours("viscam", {0xfc00, 0x801f, 0x8000 | 8 | 16 << 5 | 24 << 10}),
+              (Colours{red, blue, glm::ivec3(197, 132, 66)}));
+    EXPECT_EQ(stlColours("viscam", {0xfc00, 0}), (Colours{red, glm::ivec3(153)}));
+    EXPECT_EQ(stlColours("plain", {0, 0x7fff}), (Colours{plain, plain}));
 }
 
 TEST(Obj, VRunsDownInMeshAndKdIsSrgb) {

@@ -1,3 +1,4 @@
+#include <array>
 #include <cstdlib>
 #include <fstream>
 
@@ -54,6 +55,85 @@ TEST(Mtl, AlphaMapIsTheAlphaOfTheTexture) {
     EXPECT_EQ(alone.mesh.textures.at(plain.baseColourTexture).pixels.at(1, 0),
               glm::u8vec4(255, 255, 255, 128));
     EXPECT_EQ(plain.baseColour, glm::vec4(0, 0, 1, 1));
+}
+
+/// A triangle of three corners with `first`, then one with `second` behind the coordinates.
+std::array<glm::vec4, 2> coloursOfTwo(const std::string& first, const std::string& second) {
+    std::string text;
+    for (int i = 0; i < 6; ++i)
+        text += fmt::format("v {} {} {} {}\n", i % 3 / 2, i % 3 % 2, i / 3, i < 3 ? first : second);
+    const auto model = readGoodText(text + "f 1 2 3\nf 4 5 6\n", "a.obj");
+    EXPECT_TRUE(model.notes.empty()) << model.notes[0];
+    EXPECT_EQ(model.mesh.triangles.size(), 2u);
+    const MaterialSampler sampler(model.mesh);
+    return {sampler.colour(0, glm::vec3(1.0f / 3.0f)), sampler.colour(1, glm::vec3(1.0f / 3.0f))};
+}
+
+TEST(Obj, VerticesWithoutAColourAreWhiteBesideColoured) {
+    const glm::vec4 white(1), green(0, 1, 0, 1), blue(0, 0, 1, 1);
+    using Two = std::array<glm::vec4, 2>;
+    EXPECT_EQ(coloursOfTwo("", "0 1 0"), (Two{white, green}));
+    EXPECT_EQ(coloursOfTwo("0 1 0", ""), (Two{green, white}));
+    EXPECT_EQ(coloursOfTwo("1", "0 0 1"), (Two{white, blue})) << "a w";
+    EXPECT_EQ(coloursOfTwo("0 0 255", ""), (Two{blue, white})) << "bytes";
+    EXPECT_EQ(coloursOfTwo("0 0 1", "0 1 0"), (Two{blue, green}));
+    EXPECT_EQ(coloursOfTwo("# plain", "0 1 0"), (Two{white, green})) << "a comment";
+}
+
+TEST(Mtl, OneValueIsAllThree) {
+    TemporaryFolder folder;
+    const auto grey = objWith(folder, "Kd 0.5\n");
+    expectNear(glm::vec3(colourOf(grey.mesh)), glm::vec3(0.5f), 1e-4f);
+    expectNear(glm::vec3(colourOf(objWith(folder, "Kd 0\nKe 0.25 # dim\n").mesh)), glm::vec3(0.25f),
+               1e-4f);
+    expectNear(glm::vec3(colourOf(objWith(folder, "Kd 0 1 0\r\n").mesh)), glm::vec3(0, 1, 0),
+               1e-4f);
+}
+
+TEST(Mtl, HaloIsLeftOut) {
+    TemporaryFolder folder;
+    const auto model = objWith(folder, "Kd 1 0 0\nd -halo 0.25\n");
+    EXPECT_TRUE(model.hasNote("material 'paint': option -halo of d is dropped"));
+    EXPECT_FLOAT_EQ(colourOf(model.mesh).a, 0.25f);
+    EXPECT_EQ(objWith(folder, "Kd 1 0 0\nd 0.5\n").notes.size(), 0u);
+}
+
+TEST(Mtl, SeveralFilesOnALine) {
+    TemporaryFolder folder;
+    write(folder / "one.mtl", "newmtl red\nKd 1 0 0");
+    write(folder / "two b.mtl", "newmtl green\nKd 0 1 0\n");
+    write(folder / "all of it.mtl x.mtl", "newmtl red\nKd 0 0 1\nnewmtl green\nKd 0 0 1\n");
+    const auto coloursWith = [&](const std::string& names) {
+        write(folder / "a.obj", "mtllib " + names +
+                                    "\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n"
+                                    "v 0 0 1\nv 1 0 1\nv 0 1 1\nusemtl green\nf 4 5 6\n");
+        const auto model = readGood(folder / "a.obj");
+        std::string colours;
+        for (std::uint32_t i = 0; i < 2; ++i) {
+            const auto c = MaterialSampler(model.mesh).colour(i, glm::vec3(1.0f / 3.0f));
+            const bool grey = c.r > 0 && c.r < 1;
+            colours += grey ? "grey " : fmt::format("{}{}{} ", c.r, c.g, c.b);
+        }
+        return colours + (model.notes.empty() ? "" : model.notes[0]);
+    };
+    EXPECT_EQ(coloursWith("one.mtl two b.mtl"), "100 010 ");
+    EXPECT_EQ(coloursWith("two b.mtl  \tone.mtl"), "100 010 ");
+    EXPECT_EQ(coloursWith("all of it.mtl x.mtl"), "001 001 ") << "one name that is there";
+    EXPECT_EQ(coloursWith("one.mtl"),
+              "100 111 material 'green' is in no material file; it has no colour");
+    EXPECT_EQ(coloursWith("gone.mtl one.mtl"),
+              "100 111 material 'green' is in no material file; it has no colour");
+    EXPECT_EQ(coloursWith("gone.mtl lost.mtl"),
+              "grey grey material file 'gone.mtl lost.mtl' cannot be read; its materials have no "
+              "colour");
+}
+
+TEST(Obj, MaterialsThatNoFileHasAreSaidOnce) {
+    const std::string triangles =
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\nusemtl a\nf 3 2 1\n";
+    const auto notes = readGoodText(triangles, "a.obj").notes;
+    ASSERT_EQ(notes.size(), 2u) << "and that the model has no colour";
+    EXPECT_EQ(notes[0], "2 materials, 'a' the first, are in no material file; they have no colour");
 }
 
 TEST(Mtl, ScaleAndOffsetOfATextureMoveItsCoordinates) {

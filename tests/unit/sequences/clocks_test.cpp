@@ -129,6 +129,21 @@ TEST(Clocks, OneMomentKeepsItsTime) {
     }
 }
 
+TEST(Clocks, ShortFramesHaveLessSlack) {
+    Timeline line;
+    line.times = {0, 1, 1.001, 1.002};
+    line.end = 1.003;
+    line.findTick();
+    EXPECT_EQ(shownAt(line, {0.9995, 0.99995, 1.0005, 1.0008, 1.00095, 1.002}),
+              (std::vector<std::size_t>{0, 1, 1, 1, 2, 3}))
+        << "a tenth of a millisecond";
+    line.times = {0, 0.008, 0.017, 0.025};  // 120 frames a second, in milliseconds
+    line.end = 0.033;
+    line.findTick();
+    EXPECT_EQ(shownAt(line, {1 / 120.0, 2 / 120.0, 3 / 120.0}),
+              (std::vector<std::size_t>{1, 2, 3}));
+}
+
 TEST(Clocks, CoarserTicksHaveMoreSlackUpToHalfAMillisecond) {
     EXPECT_NEAR(halfTick(1e-6, 0), 5e-7, 1e-12);
     EXPECT_NEAR(halfTick(0.04, 0), 0.0005, 1e-9);

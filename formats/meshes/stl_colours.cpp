@@ -1,0 +1,51 @@
+#include "formats/meshes/stl_colours.hpp"
+
+#include <cstring>
+#include <string_view>
+
+namespace stx {
+namespace {
+
+constexpr std::size_t kHeader = 80, kFacets = 84, kFacet = 50, kAttribute = 48;
+
+/// The object's colour in the header of Magics.
+std::optional<glm::vec4> objectColour(ByteSpan bytes) {
+    constexpr std::string_view kKey = "COLOR=";
+    const std::string_view header(reinterpret_cast<const char*>(bytes.data()), kHeader);
+    const auto at = header.find(kKey);
+    if (at == std::string_view::npos || at + kKey.size() + 4 > kHeader) return std::nullopt;
+    glm::vec4 colour;
+    for (int k = 0; k < 4; ++k)
+        colour[k] = static_cast<float>(bytes[at + kKey.size() + k]) / 255.0f;
+    return colour;
+}
+
+}  // namespace
+
+std::optional<std::uint32_t> facetsOfBinaryStl(ByteSpan bytes) {
+    std::uint32_t facets = 0;
+    if (bytes.size() >= kFacets) std::memcpy(&facets, bytes.data() + kHeader, sizeof(facets));
+    if (bytes.size() != kFacets + std::uint64_t{facets} * kFacet) return std::nullopt;
+    return facets;
+}
+
+void readStlColours(ByteSpan bytes, std::vector<glm::vec4>& colours) {
+    const auto facets = facetsOfBinaryStl(bytes);
+    if (!facets) return;
+    const auto object = objectColour(bytes);
+    if (object) colours.assign(std::size_t{*facets} * 3, *object);
+    if (colours.size() != std::size_t{*facets} * 3) return;
+    for (std::size_t i = 0; i < *facets; ++i) {
+        std::uint16_t bits = 0;
+        std::memcpy(&bits, bytes.data() + kFacets + i * kFacet + kAttribute, sizeof(bits));
+        const bool own = (bits & 0x8000) == 0 ? object.has_value() : !object;
+        if (!own) continue;
+        const glm::vec4 lowestFirst(bits & 31, bits >> 5 & 31, bits >> 10 & 31, 31);
+        const auto colour =
+            (object ? lowestFirst : glm::vec4(lowestFirst.b, lowestFirst.g, lowestFirst.r, 31)) /
+            31.0f;
+        for (int k = 0; k < 3; ++k) colours[i * 3 + k] = colour;
+    }
+}
+
+}  // namespace stx

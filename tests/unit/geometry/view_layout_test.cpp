@@ -1,0 +1,79 @@
+#include "lib/geometry/view_layout.hpp"
+
+#include <gtest/gtest.h>
+
+#include "formats/stx/stx.hpp"
+#include "lib/capture/capture.hpp"
+#include "lib/render/scene/page_set.hpp"
+
+namespace stx {
+namespace {
+
+const std::vector<glm::vec3> kPoints = {
+    {1, 0, 0}, {-1, 0.5f, 0}, {0, -0.7f, 0.3f}, {0.2f, 0.4f, -1}};
+
+std::vector<Camera> camerasAround(double scale, glm::vec3 centre, ViewLayout::Kind kind) {
+    auto points = kPoints;
+    for (auto& p : points) p = p * static_cast<float>(scale) + centre;
+    ViewLayout layout;
+    layout.kind = kind;
+    layout.count = 8;
+    const auto cameras = layoutCameras(layout, {}, points);
+    EXPECT_TRUE(cameras);
+    return cameras ? *cameras : std::vector<Camera>{};
+}
+
+TEST(LayoutCameras, FollowTheSizeOfTheObject) {
+    const auto unit = camerasAround(1, {}, ViewLayout::Kind::sphere);
+    for (const double scale : {1e-15, 1e-9, 1e-7, 1e-3, 1e9}) {
+        const auto scaled = camerasAround(scale, {}, ViewLayout::Kind::sphere);
+        ASSERT_EQ(scaled.size(), unit.size());
+        for (std::size_t i = 0; i < unit.size(); ++i) {
+            EXPECT_NEAR(scaled[i].fx / unit[i].fx, 1, 1e-5) << scale;
+            EXPECT_LT(glm::distance(scaled[i].position / scale, unit[i].position), 1e-5) << scale;
+        }
+    }
+}
+
+TEST(LayoutCameras, SeeASinglePoint) {
+    for (const glm::vec3 place : {glm::vec3(0), glm::vec3(1e-9f), glm::vec3(5, 0, 0)}) {
+        for (const Camera& c : camerasAround(0, place, ViewLayout::Kind::ring)) {
+            EXPECT_TRUE(c.check());
+            EXPECT_GT(glm::distance(c.position, glm::dvec3(place)), 0);
+        }
+    }
+}
+
+TEST(DepthRange, OfWhatIsFlatFollowsItsDistance) {
+    for (const float distance : {3e-9f, 1e-12f, 1.0f, 1e6f}) {
+        ReferenceView view;
+        view.depth = Image<float>(2, 2);
+        for (float& d : view.depth.pixels()) d = distance;
+        fitDepthRange(view);
+        EXPECT_GT(view.nearPlane, 0.99f * distance);
+        EXPECT_LT(view.farPlane, 1.01f * distance);
+    }
+}
+
+TEST(SameCamera, OnTheScaleOfItsPosition) {
+    for (const double scale : {1.0, 1e-9, 1e-15}) {
+        Camera a;
+        a.position = {scale, 0, 0};
+        Camera b = a;
+        EXPECT_TRUE(sameCamera(a, b));
+        b.position.x *= 1 + 1e-12;
+        EXPECT_TRUE(sameCamera(a, b)) << scale;
+        b.position.y = 0.01 * scale;
+        EXPECT_FALSE(sameCamera(a, b)) << scale;
+    }
+}
+
+TEST(OrbitCameras, FollowTheRadius) {
+    const auto unit = orbitCameras({}, 1, {}, {});
+    const auto tiny = orbitCameras({}, 1e-12, {}, {});
+    ASSERT_TRUE(unit && tiny);
+    EXPECT_LT(glm::distance((*tiny)[0].position * 1e12, (*unit)[0].position), 1e-6);
+}
+
+}  // namespace
+}  // namespace stx
