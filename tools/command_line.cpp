@@ -139,11 +139,16 @@ Error usageError(const CLI::App& app, const CLI::ParseError& error, int argc, ch
             return unknownCommand(unknown, known);
         unknown.clear();
     } else if (const auto rest = where.remaining(); !rest.empty()) {
-        unknown = rest[0].substr(0, rest[0].find('='));
+        // "--" itself is known: what is behind it is an input.
+        const bool onlyInputs = rest[0] == "--" && rest.size() > 1;
+        unknown = rest[onlyInputs ? 1 : 0];
+        if (!onlyInputs) unknown = unknown.substr(0, unknown.find('='));
         for (const auto* option : where.get_options()) {
             for (const auto& name : option->get_lnames()) known.push_back("--" + name);
         }
-        if (unknown.rfind("--", 0) == 0)
+        if (onlyInputs)
+            message = fmt::format("unexpected argument '{}'; behind '--' are inputs only", unknown);
+        else if (unknown.rfind("--", 0) == 0)
             message = fmt::format("unknown option '{}'", unknown);
         else
             message = fmt::format("unexpected argument '{}'", unknown);

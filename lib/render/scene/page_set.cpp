@@ -277,12 +277,15 @@ ReferenceView PageSet::copyOfView(std::size_t number) const {
 }
 
 bool sameCamera(const Camera& a, const Camera& b) {
+    // Scene units: what a camera at the origin is off in files that were turned.
+    constexpr double kRounding = 1e-15;
     const auto near = [](double x, double y) {
         return std::abs(x - y) <= 1e-9 * std::max(1.0, std::abs(x));
     };
     return a.width == b.width && a.height == b.height && a.orthographic == b.orthographic &&
            near(a.fx, b.fx) && near(a.fy, b.fy) && near(a.cx, b.cx) && near(a.cy, b.cy) &&
-           glm::distance(a.position, b.position) <= 1e-9 * glm::length(a.position) &&
+           glm::distance(a.position, b.position) <=
+               std::max(kRounding, 1e-9 * glm::length(a.position)) &&
            std::abs(std::abs(glm::dot(a.orientation, b.orientation)) - 1.0) <= 1e-12;
 }
 

@@ -56,7 +56,7 @@ TEST(DepthRange, OfWhatIsFlatFollowsItsDistance) {
 }
 
 TEST(SameCamera, OnTheScaleOfItsPosition) {
-    for (const double scale : {1.0, 1e-9, 1e-15}) {
+    for (const double scale : {1.0, 1e-9, 1e-12}) {
         Camera a;
         a.position = {scale, 0, 0};
         Camera b = a;
@@ -66,6 +66,9 @@ TEST(SameCamera, OnTheScaleOfItsPosition) {
         b.position.y = 0.01 * scale;
         EXPECT_FALSE(sameCamera(a, b)) << scale;
     }
+    Camera origin, turned;
+    turned.position = {1e-17, 0, -6e-17};
+    EXPECT_TRUE(sameCamera(origin, turned));
 }
 
 TEST(OrbitCameras, FollowTheRadius) {
