@@ -425,8 +425,9 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
     };
     // One name on the command line is one conversion; a list is a batch, however short.
     o.batch.total = items.size();
-    if (items.size() > 1 || o.inputs[0][0] == '@' || o.batch.shard.given)
-        return runBatch(itemsOf(items, o.batch.shard), o.batch, work, program);
+    const bool many = items.size() > 1 || o.inputs[0][0] == '@' || o.batch.shard.given;
+    o.open.set.manyKinds = many;
+    if (many) return runBatch(itemsOf(items, o.batch.shard), o.batch, work, program);
 
     std::error_code ec;
     nlohmann::ordered_json entry;
@@ -549,8 +550,9 @@ void addSetCameras(Command& c, const std::shared_ptr<ConvertOptions>& o) {
             "photo: the distances of its nearest and farthest depth",
             {&set.depthMin, &set.depthMax});
     c.option("--depth-unit", set.depthUnit,
-             "Scene units of one step of a film's depth, as in 0.001 for millimetres (default: as "
-             "the cameras' file says), or of depth beside a photo")
+             "Scene units of one step of integer depth, as in 0.001 for millimetres: of films, of "
+             "depth beside a photo, and of sets whose depth is distances (default: as the set "
+             "says, or as is usual of its kind)")
         .positive();
     numbers(
         "--intrinsics", "FX,FY,CX,CY",

@@ -8,6 +8,7 @@
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/poses.hpp"
+#include "formats/imagesets/set_options.hpp"
 #include "formats/imagesets/text_lines.hpp"
 #include "lib/base/whole_number.hpp"
 
@@ -151,7 +152,7 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
         v.width = size->x;
         v.height = size->y;
         view.camera = cameraFromVision(v);
-        view.distances = scaledIntegers(kMillimetre);
+        view.distances = scaledIntegers(unitOf(options, kMillimetre));
         view.sensor = true;
         set.views.push_back(std::move(view));
     }

@@ -13,6 +13,7 @@
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/poses.hpp"
+#include "formats/imagesets/set_options.hpp"
 #include "formats/imagesets/text_lines.hpp"
 #include "formats/imagesets/two_cameras.hpp"
 #include "lib/base/whole_number.hpp"
@@ -351,7 +352,7 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
         view.camera = cameraFromVision(v);
         if (depth) view.depthCamera = cameraBeside(v, *depth);
         view.lens = k.lens;
-        view.distances = scaledIntegers(kMetre);
+        view.distances = scaledIntegers(unitOf(options, kMetre));
         view.sensor = true;
         set.views.push_back(std::move(view));
     }

@@ -8,6 +8,7 @@
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/poses.hpp"
+#include "formats/imagesets/set_options.hpp"
 #include "formats/imagesets/text_lines.hpp"
 #include "formats/imagesets/two_cameras.hpp"
 
@@ -91,7 +92,7 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
             view.depthCamera = cameraBeside(v, *depth);
         }
         view.camera = cameraFromVision(v);
-        view.distances = scaledIntegers(0.001, 65535);
+        view.distances = scaledIntegers(unitOf(options, kMillimetre), 65535);
         view.sensor = true;
         set.views.push_back(std::move(view));
     }
