@@ -554,11 +554,17 @@ void addSetCameras(Command& c, const std::shared_ptr<ConvertOptions>& o) {
              "depth beside a photo, and of sets whose depth is distances (default: as the set "
              "says, or as is usual of its kind)")
         .positive();
-    numbers(
-        "--intrinsics", "FX,FY,CX,CY",
-        "Of TUM and 7-Scenes recordings that do not hold them: the colour camera's; of a photo: "
-        "in pixels of the upright picture",
-        {&set.intrinsics[0], &set.intrinsics[1], &set.intrinsics[2], &set.intrinsics[3]});
+    c.option(
+         "--intrinsics",
+         [o](const std::string& text) -> Result<void> {
+             auto& k = o->open.set.intrinsics;
+             STX_CHECK(setTextOptions("--intrinsics", text, {&k[0], &k[1], &k[2], &k[3]}));
+             if (k[0] != 0 && k[1] != 0) return {};
+             return fail(ErrorCode::usage, "the focal lengths are {:g} and {:g}", k[0], k[1]);
+         },
+         "Of TUM, 7-Scenes and Open3D recordings that do not hold them: the colour camera's; of a "
+         "photo: in pixels of the upright picture")
+        .takes("FX,FY,CX,CY");
     c.option(
          "--depth-intrinsics",
          [o](const std::string& text) -> Result<void> {

@@ -11,6 +11,7 @@
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/set_options.hpp"
+#include "formats/imagesets/two_cameras.hpp"
 #include "formats/photos/photo.hpp"
 
 namespace stx::imagesets {
@@ -293,6 +294,12 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
     if (options.intrinsics[0] != 0 && options.photo.fovRad > 0)
         return failAt(where, ErrorCode::usage,
                       "--intrinsics and --fov both say what its camera is; give one of them");
+    STX_TRY(const auto asked, within(where, givenIntrinsics(options)));
+    if (asked && !(asked->x > 0 && asked->y > 0))
+        return failAt(
+            where, ErrorCode::usage,
+            "the focal lengths of --intrinsics are {:g} and {:g}; two above 0 are expected",
+            asked->x, asked->y);
     if (std::filesystem::is_directory(given, ec))
         return failAt(where, ErrorCode::invalidInput,
                       "a folder; a photograph with depth is one file (many: @LIST)");
@@ -347,6 +354,8 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
     SetDescription set;
     std::vector<std::string> notes;
     view.camera = cameraOfPhoto(*photo, size, options, set.cameraFrom, notes);
+    // Counted from the corner.
+    if (asked) noteOddCentre(*asked - PixelIntrinsics(0, 0, 0.5, 0.5), size, job);
     noteDepth(*photo, depth, options, notes);
     view.stretched = beside.empty();
     const bool raises = options.refine.atImport(RefineStep::raise, true);

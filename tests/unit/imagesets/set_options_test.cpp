@@ -163,3 +163,85 @@ TEST(SetOptions, OnesOfOtherKindsAreNotedInLists) {
     EXPECT_NE(notes[0].find("--focal"), std::string::npos) << notes[0];
     EXPECT_NE(notes[1].find("--yuv"), std::string::npos) << notes[1];
 }
+
+namespace {
+
+/// A folder without intrinsics and with pictures of that size.
+void writeBare(const TemporaryFolder& folder, const std::string& kind, glm::ivec2 size) {
+    writeWall(folder, kind);
+    std::filesystem::remove(folder / "intrinsics.txt");
+    std::filesystem::remove(folder / "camera.json");
+    ReferenceView view;
+    view.texture = Rgba8Image(size.x, size.y, {10, 200, 30, 255});
+    const auto files = [&](const std::string& colour, const std::string& depth) {
+        writeColour(folder / colour, view);
+        writeCodes(folder / depth, size.x, size.y, 16, [](int, int) { return kCode; });
+    };
+    if (kind == "tum") files("rgb/1.png", "depth/1.png");
+    if (kind == "7scenes") files("frame-000000.color.png", "frame-000000.depth.png");
+    if (kind == "open3d") files("color/0.png", "depth/0.png");
+}
+
+struct ReadNoted {
+    Result<Bundle> bundle;
+    std::string notes;
+};
+ReadNoted readNoted(const std::filesystem::path& set, const ImageSetOptions& options) {
+    Job job;
+    ReadNoted out{readImageSet(set, options, job), ""};
+    for (const std::string& note : job.takeNotes()) out.notes += note + "\n";
+    return out;
+}
+
+}  // namespace
+
+/// The usual intrinsics are of 640x480: smaller pictures of that shape have them scaled.
+TEST(UsualIntrinsics, AreScaledToThePictures) {
+    for (const std::string kind : {"tum", "7scenes", "open3d"})
+        for (const int width : {320, 160}) {
+            SCOPED_TRACE(kind);
+            const TemporaryFolder folder;
+            writeBare(folder, kind, {width, width * 3 / 4});
+            ImageSetOptions options = optionsOf(kind);
+            options.intrinsics[0] = 0;
+            const auto read = readNoted(folder.path(), options);
+            ASSERT_TRUE(read.bundle) << read.bundle.error().text();
+            const Camera& c = read.bundle->views[0].camera;
+            EXPECT_NEAR(c.fx, 525 * width / 640.0, 1e-9);
+            EXPECT_NEAR(c.cx, width * 0.5, 1e-9);
+            EXPECT_NE(read.notes.find(fmt::format("scaled from 640x480 to {}x", width)),
+                      std::string::npos)
+                << read.notes;
+        }
+}
+
+TEST(UsualIntrinsics, OfAnotherShapeCannotFit) {
+    for (const std::string kind : {"tum", "7scenes", "open3d"}) {
+        SCOPED_TRACE(kind);
+        const TemporaryFolder folder;
+        writeBare(folder, kind, {480, 480});
+        ImageSetOptions options = optionsOf(kind);
+        options.intrinsics[0] = 0;
+        const auto read = readNoted(folder.path(), options);
+        ASSERT_TRUE(read.bundle) << read.bundle.error().text();
+        EXPECT_NE(read.notes.find("cannot fit 480x480"), std::string::npos) << read.notes;
+    }
+}
+
+TEST(Intrinsics, OnesThatCannotBeACamerasAreTold) {
+    for (const std::string kind : {"tum", "7scenes", "open3d"}) {
+        SCOPED_TRACE(kind);
+        const TemporaryFolder folder;
+        writeWall(folder, kind);
+        ImageSetOptions options = optionsOf(kind);
+        const auto give = [&](glm::dvec4 k) { std::copy(&k.x, &k.x + 4, options.intrinsics); };
+        give({20, 0, 11.5, 7.5});
+        const auto zero = readSet(folder.path(), options);
+        expectError(zero, {"--intrinsics", "focal lengths", "20 and 0"});
+        EXPECT_EQ(zero.error().code, ErrorCode::usage);
+        give({20, 20, 9999, 7.5});
+        EXPECT_NE(readNoted(folder.path(), options).notes.find("outside"), std::string::npos);
+        give({20, 20, 11.5, 7.5});
+        EXPECT_EQ(readNoted(folder.path(), options).notes.find("outside"), std::string::npos);
+    }
+}
