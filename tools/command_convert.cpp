@@ -425,8 +425,9 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
     };
     // One name on the command line is one conversion; a list is a batch, however short.
     o.batch.total = items.size();
-    if (items.size() > 1 || o.inputs[0][0] == '@' || o.batch.shard.given)
-        return runBatch(itemsOf(items, o.batch.shard), o.batch, work, program);
+    const bool many = items.size() > 1 || o.inputs[0][0] == '@' || o.batch.shard.given;
+    o.open.set.manyKinds = many;
+    if (many) return runBatch(itemsOf(items, o.batch.shard), o.batch, work, program);
 
     std::error_code ec;
     nlohmann::ordered_json entry;
@@ -549,14 +550,21 @@ void addSetCameras(Command& c, const std::shared_ptr<ConvertOptions>& o) {
             "photo: the distances of its nearest and farthest depth",
             {&set.depthMin, &set.depthMax});
     c.option("--depth-unit", set.depthUnit,
-             "Scene units of one step of a film's depth, as in 0.001 for millimetres (default: as "
-             "the cameras' file says), or of depth beside a photo")
+             "Scene units of one step of integer depth, as in 0.001 for millimetres: of films, of "
+             "depth beside a photo, and of sets whose depth is distances (default: as the set "
+             "says, or as is usual of its kind)")
         .positive();
-    numbers(
-        "--intrinsics", "FX,FY,CX,CY",
-        "Of TUM and 7-Scenes recordings that do not hold them: the colour camera's; of a photo: "
-        "in pixels of the upright picture",
-        {&set.intrinsics[0], &set.intrinsics[1], &set.intrinsics[2], &set.intrinsics[3]});
+    c.option(
+         "--intrinsics",
+         [o](const std::string& text) -> Result<void> {
+             auto& k = o->open.set.intrinsics;
+             STX_CHECK(setTextOptions("--intrinsics", text, {&k[0], &k[1], &k[2], &k[3]}));
+             if (k[0] != 0 && k[1] != 0) return {};
+             return fail(ErrorCode::usage, "the focal lengths are {:g} and {:g}", k[0], k[1]);
+         },
+         "Of TUM, 7-Scenes and Open3D recordings that do not hold them: the colour camera's; of a "
+         "photo: in pixels of the upright picture")
+        .takes("FX,FY,CX,CY");
     c.option(
          "--depth-intrinsics",
          [o](const std::string& text) -> Result<void> {

@@ -4,6 +4,7 @@
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/poses.hpp"
+#include "formats/imagesets/set_options.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -91,8 +92,9 @@ Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& wher
 
 /// `depthUnit`: integers times that are distances, 0 is none (default: millimetres). `nearPlane`
 /// and `farPlane`: the code of DepthImage.
-Result<void> setDepth(const Json& c, const std::string& where, SetView& view) {
-    STX_TRY(const auto unit, findNumber(c, "depthUnit", where));
+Result<void> setDepth(const Json& c, const ImageSetOptions& options, const std::string& where,
+                      SetView& view) {
+    STX_TRY(auto unit, findNumber(c, "depthUnit", where));
     STX_TRY(const auto nearPlane, findNumber(c, "nearPlane", where));
     STX_TRY(const auto farPlane, findNumber(c, "farPlane", where));
     if (unit && !(*unit > 0))
@@ -107,6 +109,12 @@ Result<void> setDepth(const Json& c, const std::string& where, SetView& view) {
     if (nearPlane && !(*nearPlane < *farPlane))
         return failAt(where, ErrorCode::invalidInput,
                       "'nearPlane' {:g} must be below 'farPlane' {:g}", *nearPlane, *farPlane);
+    const bool given = options.depthUnit > 0;
+    if (nearPlane && given)
+        return failAt(where, ErrorCode::usage,
+                      "its depth is no distance in steps, as 'nearPlane' says; leave out "
+                      "--depth-unit");
+    if (given) unit = options.depthUnit;
     if (!nearPlane && !unit) {
         view.distances = [](Image<float>&, const Camera&, int bits, Job&) -> Result<void> {
             if (bits == 32) return {};
@@ -116,8 +124,9 @@ Result<void> setDepth(const Json& c, const std::string& where, SetView& view) {
         };
         return {};
     }
-    view.distances = [unit, nearPlane, farPlane](Image<float>& values, const Camera& camera,
-                                                 int bits, Job& job) -> Result<void> {
+    view.distances = [unit, nearPlane, farPlane, given](Image<float>& values, const Camera& camera,
+                                                        int bits, Job& job) -> Result<void> {
+        if (bits == 32 && given) return depthIsFloats("--depth-unit");
         if (bits == 32) return {};
         if (unit) return scaledIntegers(*unit)(values, camera, bits, job);
         const double last = bits == 8 ? 254 : 65534;
@@ -146,7 +155,8 @@ Result<std::vector<SetView>> camerasJsonViews(const Json& file, Job& job) {
     return views;
 }
 
-Result<SetDescription> describeCamerasJson(const path& given, const ImageSetOptions&, Job& job) {
+Result<SetDescription> describeCamerasJson(const path& given, const ImageSetOptions& options,
+                                           Job& job) {
     std::error_code ec;
     const path file = std::filesystem::is_directory(given, ec) ? given / "cameras.json" : given;
     const path folder = folderOf(file);
@@ -168,7 +178,7 @@ Result<SetDescription> describeCamerasJson(const path& given, const ImageSetOpti
         STX_TRY(view.texture, sourceInside(folder, texture, place, job.limits));
         STX_TRY(const std::string depth, needText(c, "depth", place));
         STX_TRY(view.depth, sourceInside(folder, depth, place, job.limits));
-        STX_CHECK(setDepth(c, place, view));
+        STX_CHECK(setDepth(c, options, place, view));
     }
     return set;
 }

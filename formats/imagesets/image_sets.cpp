@@ -13,6 +13,7 @@
 #include "formats/imagesets/patterns.hpp"
 #include "formats/imagesets/read_views.hpp"
 #include "formats/imagesets/recognise.hpp"
+#include "formats/imagesets/set_options.hpp"
 #include "formats/imagesets/set_views.hpp"
 #include "lib/geometry/origin.hpp"
 #include "lib/model/sequence.hpp"
@@ -45,7 +46,10 @@ Result<SetDescription> describeFiles(const path& path, const ImageSetOptions& op
     std::error_code ec;
     if (!std::filesystem::exists(path, ec))
         return failAt(inQuotes(path.string()), ErrorCode::io, "{}", whyNotThere(path));
-    if (namesFilms(options)) return describeFilms(path, options, job);
+    if (namesFilms(options)) {
+        STX_CHECK(checkOptionsOf(kFilms, options, inQuotes(path.string()), job));
+        return describeFilms(path, options, job);
+    }
     const KindEntry* entry = kindNamed(kind);
     if (!entry) {
         std::string known;
@@ -53,13 +57,7 @@ Result<SetDescription> describeFiles(const path& path, const ImageSetOptions& op
             known += fmt::format("{}{}", known.empty() ? "" : ", ", k.name);
         return fail(ErrorCode::usage, "'{}' is not a kind of image set; known are {}", kind, known);
     }
-    if ((options.depthIntrinsics || !options.depthToColour.empty()) && kind != "tum" &&
-        kind != "7scenes")
-        return failAt(
-            inQuotes(path.string()), ErrorCode::usage,
-            "--depth-intrinsics and --depth-to-colour are of TUM and 7-Scenes recordings; "
-            "this set is '{}'",
-            kind);
+    STX_CHECK(checkOptionsOf(kind, options, inQuotes(path.string()), job));
     return entry->describe(path, options, job);
 }
 

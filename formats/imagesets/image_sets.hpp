@@ -43,9 +43,13 @@ struct ImageSetOptions {
     /// A view whose files are missing (transforms, TUM, 7-Scenes) or of which no pixel has a usable
     /// depth is an error, not a note, and so is a picture of a film that is missing or damaged.
     bool strict = false;
+    /// The set is one of many, which may be of other kinds: options that its kind does not take are
+    /// noted and not refused.
+    bool manyKinds = false;
     /// Depth range that the set itself does not have (MSR, films), scene units; 0, 0 = not given.
     double depthMin = 0, depthMax = 0;
-    /// Scene units of one step of a film's depth; 0: as the file of cameras says.
+    /// Scene units of one step of integer depth, of films, depth beside photographs, and sets that
+    /// hold distances; 0: as the set says, or as is usual of its kind.
     double depthUnit = 0;
     /// Names of the images relative to the set's folder with {name} {w} {h} {format} {frame}
     /// {frame:04} in them (MIV); empty = the usual names. Names of films (.mp4, .mov, .mkv, .webm,

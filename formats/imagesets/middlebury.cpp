@@ -9,6 +9,7 @@
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/middlebury.hpp"
 #include "formats/imagesets/pictures.hpp"
+#include "formats/imagesets/set_options.hpp"
 #include "formats/imagesets/text_lines.hpp"
 #include "lib/base/whole_number.hpp"
 #include "lib/refine/shift.hpp"
@@ -235,9 +236,11 @@ Result<MiddleburyCalibration> parseMiddlebury(std::string_view text, const Limit
 Result<SetDescription> describeMiddlebury(const path& given, const ImageSetOptions& options,
                                           Job& job) {
     std::error_code ec;
-    if (!std::filesystem::is_directory(given, ec)) return describeCalibrated(given, job);
-    if (std::filesystem::is_regular_file(given / "calib.txt", ec))
-        return describeCalibrated(given / "calib.txt", job);
+    const path file = std::filesystem::is_directory(given, ec) ? given / "calib.txt" : given;
+    if (file == given || std::filesystem::is_regular_file(file, ec)) {
+        STX_CHECK(checkOptionsOf(kCalibrated, options, inQuotes(given.string()), job));
+        return describeCalibrated(file, job);
+    }
     return describeOlder(given, options, job);
 }
 

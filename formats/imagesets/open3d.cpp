@@ -8,14 +8,16 @@
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/poses.hpp"
+#include "formats/imagesets/set_options.hpp"
 #include "formats/imagesets/text_lines.hpp"
+#include "formats/imagesets/two_cameras.hpp"
 #include "lib/base/whole_number.hpp"
 
 namespace stx::imagesets {
 namespace {
 
 /// What Open3D takes where no file tells: PrimeSense's default.
-constexpr double kPrimeSense[4] = {525, 525, 319.5, 239.5};
+constexpr PixelIntrinsics kPrimeSense{525, 525, 319.5, 239.5};
 
 struct LoggedPose {
     std::size_t frame = 0;  ///< in the order of the files' names
@@ -58,12 +60,8 @@ Result<std::vector<LoggedPose>> parseLog(std::string_view text) {
     return poses;
 }
 
-/// fx fy cx cy: given, else those of a JSON in the folder, else the usual ones, with a note.
-Result<std::array<double, 4>> intrinsicsOf(const path& folder, const ImageSetOptions& options,
-                                           Job& job) {
-    std::array<double, 4> k;
-    std::copy_n(options.intrinsics, 4, k.begin());
-    if (k[0] != 0) return k;
+/// Those of a JSON in the folder; nothing: there is none.
+Result<std::optional<PixelIntrinsics>> toldIntrinsics(const path& folder, Job& job) {
     for (const std::string& name : filesIn(folder)) {
         if (path(name).extension() != ".json") continue;
         STX_TRY(const Json json, readJson(folder / name, job.limits));
@@ -74,15 +72,10 @@ Result<std::array<double, 4>> intrinsicsOf(const path& folder, const ImageSetOpt
         if (!sound)
             return failAt(inQuotes((folder / name).string()), ErrorCode::invalidInput,
                           "'intrinsic_matrix' is not a list of 9 numbers");
-        return std::array{m[0].get<double>(), m[4].get<double>(), m[6].get<double>(),
-                          m[7].get<double>()};
+        return PixelIntrinsics(m[0].get<double>(), m[4].get<double>(), m[6].get<double>(),
+                               m[7].get<double>());
     }
-    std::copy_n(kPrimeSense, 4, k.begin());
-    job.note(
-        fmt::format("the set does not tell its intrinsics; PrimeSense's usual ones are used "
-                    "(fx {:g}, fy {:g}, cx {:g}, cy {:g}); others with --intrinsics",
-                    k[0], k[1], k[2], k[3]));
-    return k;
+    return std::nullopt;
 }
 
 }  // namespace
@@ -119,10 +112,15 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
                       colours.size(), colourFolder, depths.size());
     STX_CHECK(
         checkViewCount(poses.size() / static_cast<std::size_t>(options.every), job.limits, where));
-    STX_TRY(const auto k, intrinsicsOf(folder, options, job));
-    if (k[0] == 0 || k[1] == 0)
-        return failAt(where, ErrorCode::invalidInput, "the focal lengths are {:g} and {:g}", k[0],
-                      k[1]);
+    STX_TRY(const auto asked, within(where, givenIntrinsics(options)));
+    auto told = asked;
+    if (!told) {
+        STX_TRY(told, toldIntrinsics(folder, job));
+    }
+    if (told && (told->x == 0 || told->y == 0))
+        return failAt(where, ErrorCode::invalidInput, "the focal lengths are {:g} and {:g}",
+                      told->x, told->y);
+    PixelIntrinsics k(0);
     SetDescription set;
     std::optional<glm::ivec2> size;
     std::vector<bool> posed(colours.size(), false);
@@ -138,20 +136,22 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
                                "depth/" + depths[pose.frame], where, job.limits, view));
         if (!size) {
             STX_TRY(size, within(where, imageSizeOf(view.texture, job)));
+            k = told ? *told : usualIntrinsics("PrimeSense's usual ones", kPrimeSense, *size, job);
+            if (asked) noteOddCentre(k, *size, job);
         }
         VisionCamera v;
         STX_TRY(v.worldFromCamera,
-                repairRotation(pose.rotation, k[0], logWhere + ": " + pose.where, job));
+                repairRotation(pose.rotation, k.x, logWhere + ": " + pose.where, job));
         v.centre = pose.centre;
-        v.fx = k[0];
-        v.fy = k[1];
+        v.fx = k.x;
+        v.fy = k.y;
         // They count from the first pixel's centre.
-        v.cx = k[2] + 0.5;
-        v.cy = k[3] + 0.5;
+        v.cx = k.z + 0.5;
+        v.cy = k.w + 0.5;
         v.width = size->x;
         v.height = size->y;
         view.camera = cameraFromVision(v);
-        view.distances = scaledIntegers(kMillimetre);
+        view.distances = scaledIntegers(unitOf(options, kMillimetre));
         view.sensor = true;
         set.views.push_back(std::move(view));
     }

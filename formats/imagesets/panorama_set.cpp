@@ -7,6 +7,7 @@
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/imagesets/pictures.hpp"
+#include "formats/imagesets/set_options.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -55,14 +56,7 @@ SetDescription setOf(PictureSource texture, PictureSource depth, const ImageSetO
     view.load = [yuv = options.yuv, deep = options.deepColour](const SetView& set, Job& job) {
         return loadPanorama(set, yuv, deep, job);
     };
-    view.distances = [](Image<float>& values, const Camera& camera, int bits,
-                        Job& notes) -> Result<void> {
-        if (bits == 32) return {};
-        if (bits != 16)
-            return fail(ErrorCode::invalidInput,
-                        "the depth has {} bits; 16 (millimetres) or floats are expected", bits);
-        return scaledIntegers(0.001)(values, camera, bits, notes);
-    };
+    view.distances = integersOrFloats(options, kMillimetre);
     SetDescription set;
     set.views.push_back(std::move(view));
     return set;

@@ -10,6 +10,8 @@
 #include "formats/images/images.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/pictures.hpp"
+#include "formats/imagesets/set_options.hpp"
+#include "formats/imagesets/two_cameras.hpp"
 #include "formats/photos/photo.hpp"
 
 namespace stx::imagesets {
@@ -106,10 +108,12 @@ Result<StoredDepth> storedDepth(const Photo& photo, const PhotoDepth& depth, Job
 Result<void> readBesideCode(const path& file, const ImageSetOptions& options, int bits,
                             PhotoDepth& depth) {
     if (bits == 32) {
-        if (options.depthMin > 0 || options.depthUnit > 0)
-            return failAt(inQuotes(file.filename().string()), ErrorCode::usage,
-                          "the depth is floats, which are distances; {} is of grey pictures",
-                          options.depthMin > 0 ? "--depth-range" : "--depth-unit");
+        const char* option = options.depthMin > 0                      ? "--depth-range"
+                             : options.depthUnit > 0                   ? "--depth-unit"
+                             : options.photo.nearIs != NearIs::unknown ? "--depth-near"
+                                                                       : nullptr;
+        if (option)
+            return within(inQuotes(file.filename().string()), Result<void>(depthIsFloats(option)));
         return {};
     }
     if (options.depthUnit > 0) {
@@ -287,6 +291,15 @@ Result<StoredView> loadPhoto(const Photo& photo, const PhotoDepth& depth, bool w
 Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& options, Job& job) {
     const std::string where = inQuotes(given.string());
     std::error_code ec;
+    if (options.intrinsics[0] != 0 && options.photo.fovRad > 0)
+        return failAt(where, ErrorCode::usage,
+                      "--intrinsics and --fov both say what its camera is; give one of them");
+    STX_TRY(const auto asked, within(where, givenIntrinsics(options)));
+    if (asked && !(asked->x > 0 && asked->y > 0))
+        return failAt(
+            where, ErrorCode::usage,
+            "the focal lengths of --intrinsics are {:g} and {:g}; two above 0 are expected",
+            asked->x, asked->y);
     if (std::filesystem::is_directory(given, ec))
         return failAt(where, ErrorCode::invalidInput,
                       "a folder; a photograph with depth is one file (many: @LIST)");
@@ -341,6 +354,8 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
     SetDescription set;
     std::vector<std::string> notes;
     view.camera = cameraOfPhoto(*photo, size, options, set.cameraFrom, notes);
+    // Counted from the corner.
+    if (asked) noteOddCentre(*asked - PixelIntrinsics(0, 0, 0.5, 0.5), size, job);
     noteDepth(*photo, depth, options, notes);
     view.stretched = beside.empty();
     const bool raises = options.refine.atImport(RefineStep::raise, true);

@@ -203,8 +203,8 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
     if (broken) return tl::unexpected(*broken);
     return failAt(where, ErrorCode::invalidInput,
                   "no image set is recognised in this folder: transforms.json, cameras.json, "
-                  "calib.txt, calibParams-*.txt, sparse/, pose.txt, groundtruth.txt or "
-                  "frame-*.pose.txt is expected");
+                  "calib.txt, calibParams-*.txt, sparse/, pose.txt, groundtruth.txt, "
+                  "trajectory.log or frame-*.pose.txt is expected");
 }
 
 }  // namespace stx

@@ -13,6 +13,7 @@
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/poses.hpp"
+#include "formats/imagesets/set_options.hpp"
 #include "formats/imagesets/text_lines.hpp"
 #include "formats/imagesets/two_cameras.hpp"
 #include "lib/base/whole_number.hpp"
@@ -25,50 +26,39 @@ constexpr double kMetre = 1.0 / 5000;
 constexpr double kSameTime = 0.02;
 
 struct Intrinsics {
-    double fx, fy, cx, cy;
+    PixelIntrinsics k;
     Lens lens;
+    std::string_view whose;  ///< of pictures of 640x480, published; empty: told of these pictures
 };
 
-Intrinsics intrinsicsOf(double fx, double fy, double cx, double cy) {
-    return {fx, fy, cx, cy, {}};
-}
-
-/// Given, else in a file, else those published for the recording, with a note.
+/// Given, else in a file, else those published for the recording.
 Result<Intrinsics> findIntrinsics(const path& folder, bool icl, const ImageSetOptions& options,
-                                  Job& job) {
-    const auto* g = options.intrinsics;
-    if (g[0] != 0) return intrinsicsOf(g[0], g[1], g[2], g[3]);
+                                  const std::string& where, Job& job) {
+    STX_TRY(const auto asked, within(where, givenIntrinsics(options)));
+    if (asked) return Intrinsics{*asked, {}, {}};
     const std::string file = firstThere(folder, {"intrinsics.txt", "calibration.txt", "camera.txt",
                                                  "camera_intrinsics.txt", "camera-intrinsics.txt"});
     if (!file.empty()) {
         STX_TRY(const auto n, numbersIn(folder / file, job.limits));
-        if (n.size() == 9) return intrinsicsOf(n[0], n[4], n[2], n[5]);
-        if (n.size() == 4) return intrinsicsOf(n[0], n[1], n[2], n[3]);
+        if (n.size() == 9) return Intrinsics{{n[0], n[4], n[2], n[5]}, {}, {}};
+        if (n.size() == 4) return Intrinsics{{n[0], n[1], n[2], n[3]}, {}, {}};
         return failAt(inQuotes((folder / file).string()), ErrorCode::invalidInput,
                       "{} numbers; 'fx fy cx cy' or a 3x3 matrix is expected", n.size());
     }
     const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
     const auto has = [&](const char* part) { return name.find(part) != std::string::npos; };
-    Intrinsics i = intrinsicsOf(525, 525, 319.5, 239.5);
-    const char* whose = "the usual Kinect's";
-    if (icl) {
-        i = intrinsicsOf(481.2, -480.0, 319.5, 239.5);
-        whose = "ICL-NUIM's";
-    } else if (has("freiburg1")) {
-        i = {517.3, 516.5, 318.6, 255.3, {0.2624, -0.9531, 1.1633, -0.0054, 0.0026, 0}};
-        whose = "TUM's freiburg1";
-    } else if (has("freiburg2")) {
-        i = {520.9, 521.0, 325.1, 249.7, {0.2312, -0.7849, 0.9172, -0.0033, -0.0001, 0}};
-        whose = "TUM's freiburg2";
-    } else if (has("freiburg3")) {
-        i = intrinsicsOf(535.4, 539.2, 320.1, 247.6);
-        whose = "TUM's freiburg3";
-    }
-    job.note(
-        fmt::format("the set does not tell its intrinsics; {} published ones are used (fx {:g}, "
-                    "fy {:g}, cx {:g}, cy {:g}); others with --intrinsics",
-                    whose, i.fx, i.fy, i.cx, i.cy));
-    return i;
+    if (icl) return Intrinsics{{481.2, -480.0, 319.5, 239.5}, {}, "ICL-NUIM's published ones"};
+    if (has("freiburg1"))
+        return Intrinsics{{517.3, 516.5, 318.6, 255.3},
+                          {0.2624, -0.9531, 1.1633, -0.0054, 0.0026, 0},
+                          "TUM's freiburg1 published ones"};
+    if (has("freiburg2"))
+        return Intrinsics{{520.9, 521.0, 325.1, 249.7},
+                          {0.2312, -0.7849, 0.9172, -0.0033, -0.0001, 0},
+                          "TUM's freiburg2 published ones"};
+    if (has("freiburg3"))
+        return Intrinsics{{535.4, 539.2, 320.1, 247.6}, {}, "TUM's freiburg3 published ones"};
+    return Intrinsics{{525, 525, 319.5, 239.5}, {}, "the usual Kinect's published ones"};
 }
 
 struct TimedName {
@@ -311,15 +301,12 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
                       "no colour image has both a depth image and a pose of its time");
     STX_CHECK(
         checkViewCount(frames.size() / static_cast<std::size_t>(options.every), job.limits, where));
-    STX_TRY(const Intrinsics k, findIntrinsics(folder, icl, options, job));
-    if (k.fx == 0 || k.fy == 0)
-        return failAt(where, ErrorCode::invalidInput, "the focal lengths are {:g} and {:g}", k.fx,
-                      k.fy);
-    // Published recordings have their depth on the pixels of the pictures.
-    STX_TRY(const auto depth,
-            depthCameraOf(options,
-                          {k.fx, k.fy, k.cx + 0.5, k.cy + 0.5, glm::dmat3(1.0), glm::dvec3(0.0)},
-                          false, where, job));
+    STX_TRY(const Intrinsics found, findIntrinsics(folder, icl, options, where, job));
+    PixelIntrinsics k = found.k;
+    if (k.x == 0 || k.y == 0)
+        return failAt(where, ErrorCode::invalidInput, "the focal lengths are {:g} and {:g}", k.x,
+                      k.y);
+    std::optional<DepthCamera> depth;
 
     SetDescription set;
     std::optional<glm::ivec2> size;
@@ -334,15 +321,23 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
         }
         if (!size) {
             STX_TRY(size, within(where, imageSizeOf(view.texture, job)));
+            // Depth that is damaged is told where it is read.
+            const glm::ivec2 depthSize = imageSizeOf(view.depth, job).value_or(*size);
+            if (!found.whose.empty()) k = usualIntrinsics(found.whose, k, *size, job);
+            if (options.intrinsics[0] != 0) noteOddCentre(k, *size, job);
+            // Published recordings have their depth on the pixels of the pictures.
+            KnownDepthCamera known;
+            known.camera = {k.x, k.y, k.z + 0.5, k.w + 0.5, glm::dmat3(1.0), glm::dvec3(0.0)};
+            STX_TRY(depth, depthCameraOf(options, known, *size, depthSize, where, job));
         }
         VisionCamera v;
         v.worldFromCamera = glm::mat3_cast(frame.pose.orientation);
         v.centre = frame.pose.position;
-        v.fx = k.fx;
-        v.fy = k.fy;
+        v.fx = k.x;
+        v.fy = k.y;
         // These sets count from the first pixel's centre.
-        v.cx = k.cx + 0.5;
-        v.cy = k.cy + 0.5;
+        v.cx = k.z + 0.5;
+        v.cy = k.w + 0.5;
         v.width = size->x;
         v.height = size->y;
         if (v.leftHanded())
@@ -350,8 +345,8 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
                 "the set's world is left-handed (fx or fy is negative); its z axis is negated");
         view.camera = cameraFromVision(v);
         if (depth) view.depthCamera = cameraBeside(v, *depth);
-        view.lens = k.lens;
-        view.distances = scaledIntegers(kMetre);
+        view.lens = found.lens;
+        view.distances = scaledIntegers(unitOf(options, kMetre));
         view.sensor = true;
         set.views.push_back(std::move(view));
     }

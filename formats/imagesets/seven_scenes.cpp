@@ -8,27 +8,30 @@
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/poses.hpp"
+#include "formats/imagesets/set_options.hpp"
 #include "formats/imagesets/text_lines.hpp"
 #include "formats/imagesets/two_cameras.hpp"
 
 namespace stx::imagesets {
 namespace {
 
-/// The depth camera of the Kinect that took 7-Scenes: the intrinsics that its authors name, and a
-/// calibration of that Kinect's two cameras, metres.
-DepthCamera kinectDepth() {
+/// The cameras of the Kinect that took 7-Scenes: the intrinsics that its authors name, and a
+/// calibration of where one is beside the other, metres.
+constexpr PixelIntrinsics kColour{525, 525, 319.5, 239.5}, kDepth{585, 585, 319.5, 239.5};
+
+KnownDepthCamera kinectDepth(glm::ivec2 size) {
+    const PixelIntrinsics k = scaledTo(size, kDepth);
     DepthCamera depth;
-    depth.fx = depth.fy = 585;
-    depth.cx = 320;
-    depth.cy = 240;
+    depth.fx = k.x;
+    depth.fy = k.y;
+    depth.cx = k.z + 0.5;
+    depth.cy = k.w + 0.5;
     depth.turn = glm::transpose(glm::dmat3(0.99996518, 0.00267651, -0.00790410,   //
                                            -0.00274093, 0.99996303, -0.00815045,  //
                                            0.00788199, 0.00817183, 0.99993554));
     depth.shift = {-0.02555894, 0.00010110, 0.00203183};
-    return depth;
+    return {depth, true, true, true};
 }
-/// Of its colour camera, likewise.
-constexpr double kColourFocal = 525, kColourX = 320, kColourY = 240;
 
 }  // namespace
 
@@ -44,19 +47,11 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
             "no frame-NNNNNN.pose.txt was found in it; give the folder of one sequence (seq-01)");
     STX_CHECK(
         checkViewCount(stems.size() / static_cast<std::size_t>(options.every), job.limits, where));
-    const auto* k = options.intrinsics;
-    const bool own = k[0] != 0;
-    if (own && k[1] == 0)
-        return failAt(where, ErrorCode::usage, "the focal lengths are {:g} and {:g}", k[0], k[1]);
-    // Another colour camera is one of another device.
-    DepthCamera known = kinectDepth();
-    if (own) {
-        known.fx = std::copysign(known.fx, k[0]);
-        known.fy = std::copysign(known.fy, k[1]);
-    }
-    STX_TRY(const auto depth, depthCameraOf(options, known, !own, where, job));
+    STX_TRY(const auto asked, within(where, givenIntrinsics(options)));
     SetDescription set;
     std::optional<glm::ivec2> size;
+    PixelIntrinsics k;
+    std::optional<DepthCamera> depth;
     for (const std::string& stem : stems) {
         const std::string poseName = stem + ".pose.txt";
         const std::string place = inQuotes((given / poseName).string());
@@ -74,12 +69,36 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
         }
         if (!size) {
             STX_TRY(size, within(where, imageSizeOf(view.texture, job)));
+            // Depth that is damaged is told where it is read.
+            const glm::ivec2 depthSize = imageSizeOf(view.depth, job).value_or(*size);
+            // Another colour camera is one of another device, whose depth camera nobody knows.
+            const bool own = asked && *asked != scaledTo(*size, kColour);
+            k = own ? *asked : scaledTo(*size, kColour);
+            KnownDepthCamera known = kinectDepth(depthSize);
+            known.byDefault = !own;
+            if (own) {
+                known.camera.fx = std::copysign(known.camera.fx, k.x);
+                known.camera.fy = std::copysign(known.camera.fy, k.y);
+            }
+            STX_TRY(depth, depthCameraOf(options, known, *size, depthSize, where, job));
+            if (own)
+                noteOddCentre(k, *size, job);
+            else
+                k = usualIntrinsics("those known of 7-Scenes' colour camera", kColour, *size, job);
+            if (own && !depth && options.depthToColour.empty())
+                job.note(fmt::format(
+                    "depth is taken to lie on the pixels of its picture, as --intrinsics are of "
+                    "another colour camera than 7-Scenes'; --depth-intrinsics {:g},{:g},{:g},{:g} "
+                    "is the depth camera of these",
+                    known.camera.fx, known.camera.fy, known.camera.cx - 0.5,
+                    known.camera.cy - 0.5));
         }
         VisionCamera v;
-        v.fx = own ? k[0] : kColourFocal;
-        v.fy = own ? k[1] : kColourFocal;
-        v.cx = own ? k[2] + 0.5 : kColourX;
-        v.cy = own ? k[3] + 0.5 : kColourY;
+        v.fx = k.x;
+        v.fy = k.y;
+        // These sets count from the first pixel's centre.
+        v.cx = k.z + 0.5;
+        v.cy = k.w + 0.5;
         v.width = size->x;
         v.height = size->y;
         v.centre = {n[3], n[7], n[11]};
@@ -91,20 +110,10 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
             view.depthCamera = cameraBeside(v, *depth);
         }
         view.camera = cameraFromVision(v);
-        view.distances = scaledIntegers(0.001, 65535);
+        view.distances = scaledIntegers(unitOf(options, kMillimetre), 65535);
         view.sensor = true;
         set.views.push_back(std::move(view));
     }
-    if (!own)
-        job.note(
-            fmt::format("the set does not tell its intrinsics; those known of 7-Scenes' colour "
-                        "camera are used (f {:g}, centre {:g}, {:g}); others with --intrinsics",
-                        kColourFocal, kColourX, kColourY));
-    if (depth)
-        job.note(fmt::format(
-            "depth comes from a camera of its own (f {:g}, {:.3g} mm beside) and is taken into the "
-            "picture of the colour camera; --depth-to-colour none leaves it as it is",
-            depth->fx, 1000 * glm::length(depth->shift)));
     return set;
 }
 

@@ -29,9 +29,7 @@ Result<ImageSetSummary> summariseImageSet(const std::filesystem::path& path, Job
     if (!described && described.error().code == ErrorCode::usage) {
         job.note(fmt::format("cameras are not known: {}", described.error().text()));
         summary.camerasKnown = false;
-        options.depthMin = options.focal = options.baseline = 1;
-        options.depthMax = 2;
-        for (double& value : options.intrinsics) value = 1;
+        if (summary.kind == "middlebury") options.focal = options.baseline = 1;
         described = describeSet(path, options, job);
     }
     if (!described) return propagate(described);

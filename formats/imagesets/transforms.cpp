@@ -8,6 +8,7 @@
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/poses.hpp"
+#include "formats/imagesets/set_options.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx::imagesets {
@@ -171,17 +172,6 @@ std::string nameOfFrame(const std::string& filePath) {
     return path(filePath).replace_extension().generic_string();
 }
 
-/// Integers are millimetres by convention, or what the file says; floats are scene units.
-auto distancesOf(double unit) {
-    return [unit](Image<float>& values, const Camera& camera, int bits, Job& job) -> Result<void> {
-        if (bits == 32) return {};
-        if (bits != 16)
-            return fail(ErrorCode::invalidInput,
-                        "the depth has {} bits; 16 (millimetres) or floats are expected", bits);
-        return scaledIntegers(unit)(values, camera, bits, job);
-    };
-}
-
 /// `depth_coding` of a file whose integers are not distances: normalised disparity between `near`
 /// and `far`, with `none` (0) for what is unknown.
 Result<std::optional<Distances>> codedDistances(const Json& file, const std::string& where) {
@@ -250,7 +240,8 @@ Result<std::vector<SetView>> transformsViews(const Json& file, Job& job) {
     return views;
 }
 
-Result<SetDescription> describeTransforms(const path& given, const ImageSetOptions&, Job& job) {
+Result<SetDescription> describeTransforms(const path& given, const ImageSetOptions& options,
+                                          Job& job) {
     std::error_code ec;
     const path file = std::filesystem::is_directory(given, ec) ? given / "transforms.json" : given;
     const path folder = folderOf(file);
@@ -276,6 +267,12 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
         return failAt(where, ErrorCode::invalidInput,
                       "the depth's scale is {:g}; it must be above 0", unit);
     STX_TRY(const auto coded, codedDistances(json, where));
+    if (coded && options.depthUnit > 0)
+        return failAt(where, ErrorCode::usage,
+                      "its depth is no distance in steps, as 'depth_coding' says; leave out "
+                      "--depth-unit");
+    // Millimetres by convention.
+    const Distances distances = coded ? *coded : integersOrFloats(options, unit);
     const Json& frames = json["frames"];
     const auto describe = [&](std::size_t i) -> Result<void> {
         SetView& view = set.views[i];
@@ -301,7 +298,7 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
             STX_TRY(view.mask, sourceInside(folder, *mask, place, job.limits));
             if (!view.missing) view.missing = view.mask.missing;
         }
-        view.distances = coded ? *coded : distancesOf(unit);
+        view.distances = distances;
         return {};
     };
     // Long films have tens of thousands of files to look for.

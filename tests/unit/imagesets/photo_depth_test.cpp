@@ -149,7 +149,14 @@ TEST(PhotoDepth, OptionsThatDoNotGoTogetherAreRefused) {
     photo.options.depthUnit = 0.001;
     expectError(photo.read(), {"a_depth.exr", "floats", "--depth-unit"});
     photo.options.depthUnit = 0;
+    photo.options.photo.nearIs = NearIs::white;
+    expectError(photo.read(), {"a_depth.exr", "floats", "--depth-near"});
+    photo.options.photo.nearIs = NearIs::unknown;
     EXPECT_TRUE(photo.read());
+    photo.options.photo.fovRad = 1;
+    EXPECT_TRUE(photo.read());
+    photo.options.intrinsics[0] = photo.options.intrinsics[1] = 80;
+    expectError(photo.read(), {"a.png", "--intrinsics", "--fov"});
 }
 
 TEST(PhotoDepth, OptionsOfDepthBesideAreRefusedWhereTheFileHasIt) {

@@ -1,5 +1,6 @@
 // Colour and depth from two cameras side by side: the depth is taken into the picture.
 
+#include <algorithm>
 #include <cmath>
 
 #include "lib/metrics/compare.hpp"
@@ -127,9 +128,8 @@ TEST(TwoCameras, DepthIsTakenIntoThePicture) {
     EXPECT_GT(offShare(r, one->views[0]), 0.1);
 }
 
-TEST(TwoCameras, OfTumTheColoursPoseIsGiven) {
-    const Recording r = recorded();
-    const TemporaryFolder folder;
+/// A recording in TUM's layout.
+void writeTum(const std::filesystem::path& folder, const Recording& r) {
     writeColour(folder / "rgb/1.png", r.colour);
     writeDepth(folder / "depth/1.png", r.depth, 1.0 / 5000);
     writeText(folder / "rgb.txt", "1 rgb/1.png\n");
@@ -140,6 +140,12 @@ TEST(TwoCameras, OfTumTheColoursPoseIsGiven) {
               fmt::format("1 {} {} {} {} {} {} {}\n", c.x, c.y, c.z, q.x, q.y, q.z, q.w));
     writeText(folder / "intrinsics.txt", numbers(r.colour.camera));
     writeText(folder / "motion.txt", motion());
+}
+
+TEST(TwoCameras, OfTumTheColoursPoseIsGiven) {
+    const Recording r = recorded();
+    const TemporaryFolder folder;
+    writeTum(folder.path(), r);
     ImageSetOptions options = optionsOf(r, folder.path());
     options.intrinsics[0] = 0;
     const auto read = readSet(folder.path(), options);
@@ -199,6 +205,75 @@ TEST(TwoCameras, WrongNumbersAreErrors) {
     expectError(readSet(folder.path(), options), {"motion.txt", "scales or shears"});
     writeText(folder / "motion.txt", "1 0 0 50\n0 1 0 0\n0 0 1 0\n");
     expectError(readSet(folder.path(), options), {"nothing of it is in the picture"});
+}
+
+/// The notes of a set that must be read.
+std::string notesOf(const std::filesystem::path& set, const ImageSetOptions& options) {
+    Job job;
+    const auto read = readImageSet(set, options, job);
+    EXPECT_TRUE(read) << read.error().text();
+    std::string all;
+    for (const std::string& note : job.takeNotes()) all += note + "\n";
+    return all;
+}
+void expectSaid(const std::string& notes, const char* text) {
+    EXPECT_NE(notes.find(text), std::string::npos) << text << " is missing in: " << notes;
+}
+
+/// The half that is not given is assumed aloud, where it can be assumed.
+TEST(TwoCameras, HalfOfADepthCameraIsToldOrRefused) {
+    const Recording r = recorded();
+    const TemporaryFolder folder;
+    writeTum(folder.path(), r);
+    ImageSetOptions both = optionsOf(r, folder.path());
+    both.intrinsics[0] = 0;
+    const std::string said = notesOf(folder.path(), both);
+    expectSaid(said, "depth comes from a camera of its own (f ");
+    EXPECT_EQ(said.find("is taken to be"), std::string::npos) << said;
+    ImageSetOptions pose = both;
+    pose.depthIntrinsics.reset();
+    expectSaid(notesOf(folder.path(), pose),
+               "the depth camera's intrinsics are taken to be the colour camera's");
+    ImageSetOptions lens = both;
+    lens.depthToColour.clear();
+    expectSaid(notesOf(folder.path(), lens),
+               "the depth camera is taken to be at the colour camera's place");
+    const TemporaryFolder other;
+    writeTum(other.path(), recorded(80, 60));
+    pose.depthToColour = (other / "motion.txt").string();
+    const auto read = readSet(other.path(), pose);
+    expectError(read, {"--depth-to-colour", "--depth-intrinsics", "80x60", "160x120"});
+    EXPECT_EQ(read.error().code, ErrorCode::usage);
+}
+
+/// Another colour camera is one of another device, whose depth camera nobody knows.
+TEST(TwoCameras, OwnIntrinsicsOf7ScenesLeaveTheKnownDepthCameraAloud) {
+    const Recording r = recorded();
+    const TemporaryFolder folder;
+    writeSevenScenes(folder.path(), r);
+    ImageSetOptions options = optionsOf(r, folder.path());
+    options.depthIntrinsics.reset();
+    options.depthToColour.clear();
+    const char* left = "depth is taken to lie on the pixels of its picture";
+    expectSaid(notesOf(folder.path(), options), left);
+    options.depthToColour = "none";
+    EXPECT_EQ(notesOf(folder.path(), options).find(left), std::string::npos);
+}
+
+TEST(TwoCameras, IntrinsicsOf7ScenesThatAreTheKnownOnesChangeNothing) {
+    REQUIRE_SHARED(set, "data/imagesets/7scenes-kitchen");
+    const TemporaryFolder folder;
+    for (const char* file : {".color.png", ".depth.png", ".pose.txt"})
+        std::filesystem::copy_file(set / (std::string("frame-000186") + file),
+                                   folder / (std::string("frame-000186") + file));
+    const auto as = readSet(folder.path());
+    ImageSetOptions same;
+    const double k[4] = {525, 525, 319.5, 239.5};  // what the note of the set itself names
+    std::copy(k, k + 4, same.intrinsics);
+    expectSaid(notesOf(folder.path(), {}), "fx 525, fy 525, cx 319.5, cy 239.5");
+    const auto given = readSet(folder.path(), same);
+    ASSERT_TRUE(as && given);
+    EXPECT_TRUE(std::ranges::equal(as->views[0].depth.pixels(), given->views[0].depth.pixels()));
 }
 
 /// A frame of a set drawn from the others, on pixels that both cover.

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "formats/imagesets/set_view.hpp"
+
+/// Which kinds of sets take which options of ImageSetOptions.
+namespace stx::imagesets {
+
+/// What checkOptionsOf() calls sets that --from does not name.
+inline constexpr std::string_view kFilms = "films", kCalibrated = "middlebury with calib.txt";
+
+/// Errors (usage, from `where`), or a note where ImageSetOptions::manyKinds: options are given that
+/// a set of this kind does not take. A value that is also the default is not seen.
+[[nodiscard]] Result<void> checkOptionsOf(std::string_view kind, const ImageSetOptions& options,
+                                          const std::string& where, Job& job);
+
+/// The error (usage) of an option that says what integers of depth are, where depth is floats.
+[[nodiscard]] tl::unexpected<Error> depthIsFloats(std::string_view option);
+
+/// Scene units of one step of integer depth: as --depth-unit says, else `usual`.
+[[nodiscard]] double unitOf(const ImageSetOptions& options, double usual);
+
+/// Of sets that hold integers of 16 bits in steps of unitOf() or floats, which are distances.
+/// Errors: (invalidInput) 8 bits; (usage) floats, and --depth-unit is given.
+[[nodiscard]] Distances integersOrFloats(const ImageSetOptions& options, double usual);
+
+}  // namespace stx::imagesets
