@@ -15,6 +15,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/files/messages.hpp"
 #include "formats/files/pipes.hpp"
 #include "formats/files/temporaries.hpp"
 #include "formats/meshes/text_encoding.hpp"
@@ -199,8 +200,11 @@ void BatchRun::finish(std::size_t item, Json entry) {
     if (status == "error") {
         ++failed_;
         // Not hushed by --quiet: nothing else tells which input it was.
-        program_.complain(
-            fmt::format("error: '{}': {}", items_[item].input, entry.value("message", "")));
+        const std::string message = entry.value("message", "");
+        const std::string input = inQuotes(items_[item].input);
+        program_.complain(message.starts_with(input)
+                              ? fmt::format("error: {}", message)
+                              : fmt::format("error: {}: {}", input, message));
     }
     if (options_.shard.given) {
         entry["index"] = items_[item].index;

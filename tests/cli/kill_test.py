@@ -178,6 +178,7 @@ def full_disk(args, all_commands, folder):
                     continue
                 expect(done.code == 2, f"{name}: exit code", done)
                 expect(b"No space left" in done.err, f"{name}: does not say why", done)
+                expect(b".stx-tmp-" not in done.err, f"{name}: names a file that nobody knows", done)
                 if len(command.targets) == 1:
                     expect(sorted(tree(mounted).items()) == ([(command.targets[0], old)] if old else []),
                            f"{name}: the old target is gone, or something else is there", sorted(tree(mounted)))

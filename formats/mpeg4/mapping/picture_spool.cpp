@@ -29,7 +29,9 @@ Result<ByteRange> PictureSpool::add(const Bytes& bytes) {
         const auto n = ::write(file_->file.fd.get(), bytes.data() + done, bytes.size() - done);
         if (n < 0 && errno == EINTR) continue;
         if (n <= 0)
-            return fail(ErrorCode::io, "cannot write '{}': {}", file_->file.path.string(),
+            // Its own name means nothing to anybody.
+            return fail(ErrorCode::io, "cannot write in the folder '{}': {}",
+                        file_->file.path.parent_path().string(),
                         std::generic_category().message(n < 0 ? errno : ENOSPC));
         done += static_cast<std::size_t>(n);
     }
