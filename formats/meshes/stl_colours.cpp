@@ -7,6 +7,7 @@ namespace stx {
 namespace {
 
 constexpr std::size_t kHeader = 80, kFacets = 84, kFacet = 50, kAttribute = 48;
+constexpr std::uint16_t kFlag = 0x8000, kAllSet = 0xffff;
 
 /// The object's colour in the header of Magics.
 std::optional<glm::vec4> objectColour(ByteSpan bytes) {
@@ -35,11 +36,22 @@ void readStlColours(ByteSpan bytes, std::vector<glm::vec4>& colours) {
     const auto object = objectColour(bytes);
     if (object) colours.assign(std::size_t{*facets} * 3, *object);
     if (colours.size() != std::size_t{*facets} * 3) return;
-    for (std::size_t i = 0; i < *facets; ++i) {
+    const auto attributeOf = [&](std::size_t facet) {
         std::uint16_t bits = 0;
-        std::memcpy(&bits, bytes.data() + kFacets + i * kFacet + kAttribute, sizeof(bits));
-        const bool own = (bits & 0x8000) == 0 ? object.has_value() : !object;
-        if (!own) continue;
+        std::memcpy(&bits, bytes.data() + kFacets + facet * kFacet + kAttribute, sizeof(bits));
+        return bits;
+    };
+    bool anyClear = false, anyBits = false;
+    for (std::size_t i = 0; i < *facets; ++i) {
+        anyClear = anyClear || !(attributeOf(i) & kFlag);
+        anyBits = anyBits || attributeOf(i) != 0;
+    }
+    if (!anyBits) return;
+    const bool clearIsOwn = object && anyClear;
+    for (std::size_t i = 0; i < *facets; ++i) {
+        const std::uint16_t bits = attributeOf(i);
+        const bool blank = object && !anyClear && (bits == kFlag || bits == kAllSet);
+        if (blank || ((bits & kFlag) == 0) != clearIsOwn) continue;
         const glm::vec4 lowestFirst(bits & 31, bits >> 5 & 31, bits >> 10 & 31, 31);
         const auto colour =
             (object ? lowestFirst : glm::vec4(lowestFirst.b, lowestFirst.g, lowestFirst.r, 31)) /

@@ -13,14 +13,13 @@ namespace stx {
 [[nodiscard]] std::optional<std::uint32_t> facetsOfBinaryStl(ByteSpan bytes);
 
 /// The colours of the corners of a binary STL in sRGB, as the two bytes behind each facet say
-/// (Wikipedia, "STL (file format)"):
-///  - Magics, whose header has COLOR= and the object's colour: bit 15 is clear where a facet has
-///  its
-///    own, red in the lowest five bits. All others have the object's.
-///  - VisCAM and SolidView: bit 15 is set where a facet has its own, blue in the lowest five bits.
-///    The others keep what `colours` has.
-/// Assimp takes a set bit for a colour in both, and masks five bits with 0x31. `colours` has what
-/// it gives: three for each facet, or none.
+/// (Wikipedia, "STL (file format)"). `colours` has what Assimp gives, which takes bit 15 for a
+/// colour everywhere and masks five bits with 0x31: three for each facet, or none.
+/// Magics, whose header has COLOR= and the colour of the object: bit 15 is clear where a facet has
+/// its own, red in the lowest five bits; the others have the object's. MeshLab sets bit 15 of
+/// all facets under that header, and means their own. A file of zeros has the object's, too.
+/// VisCAM and SolidView: bit 15 is set where a facet has its own, blue in the lowest five bits; the
+/// others keep what `colours` has.
 void readStlColours(ByteSpan bytes, std::vector<glm::vec4>& colours);
 
 }  // namespace stx

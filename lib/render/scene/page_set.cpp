@@ -278,7 +278,7 @@ ReferenceView PageSet::copyOfView(std::size_t number) const {
 
 bool sameCamera(const Camera& a, const Camera& b) {
     // Scene units: what a camera at the origin is off in files that were turned.
-    constexpr double kRounding = 1e-15;
+    constexpr double kRounding = 1e-13;
     const auto near = [](double x, double y) {
         return std::abs(x - y) <= 1e-9 * std::max(1.0, std::abs(x));
     };

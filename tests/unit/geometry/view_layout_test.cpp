@@ -56,7 +56,7 @@ TEST(DepthRange, OfWhatIsFlatFollowsItsDistance) {
 }
 
 TEST(SameCamera, OnTheScaleOfItsPosition) {
-    for (const double scale : {1.0, 1e-9, 1e-12}) {
+    for (const double scale : {1.0, 1e-9, 1e-10}) {
         Camera a;
         a.position = {scale, 0, 0};
         Camera b = a;
@@ -67,7 +67,7 @@ TEST(SameCamera, OnTheScaleOfItsPosition) {
         EXPECT_FALSE(sameCamera(a, b)) << scale;
     }
     Camera origin, turned;
-    turned.position = {1e-17, 0, -6e-17};
+    turned.position = {1e-17, 0, -6e-15};
     EXPECT_TRUE(sameCamera(origin, turned));
 }
 

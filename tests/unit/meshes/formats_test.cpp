@@ -111,6 +111,8 @@ TEST(Stl, ColoursOfFacets) {
     EXPECT_EQ(stlColours(magics, {0, 8 | 16 << 5 | 24 << 10}),
               (Colours{glm::ivec3(0), glm::ivec3(66, 132, 197)}))
         << "all five bits of each";
+    EXPECT_EQ(stlColours(magics, {0x801f, 0xfc00}), (Colours{red, blue})) << "as MeshLab writes";
+    EXPECT_EQ(stlColours(magics, {0, 0}), (Colours{green, green}));
     EXPECT_EQ(stlColours("viscam", {0xfc00, 0x801f, 0x8000 | 8 | 16 << 5 | 24 << 10}),
               (Colours{red, blue, glm::ivec3(197, 132, 66)}));
     EXPECT_EQ(stlColours("viscam", {0xfc00, 0}), (Colours{red, glm::ivec3(153)}));
