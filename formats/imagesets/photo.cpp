@@ -131,7 +131,7 @@ Result<void> readBesideCode(const path& file, const ImageSetOptions& options, in
 }
 
 /// How depth of that size, as it is stored beside the photo, is turned: by its own orientation;
-/// without one as the picture, where only the picture as it is stored has the same shape.
+/// without one as depthTurnOf() says.
 Result<void> findTurn(const Photo& photo, glm::ivec2 size, PhotoDepth& depth, Job& job) {
     STX_TRY(const auto bytes, readFile(depth.source.path, job.limits));
     if (const ExifNotes own = readExif(bytes); own.oriented) {
@@ -141,16 +141,9 @@ Result<void> findTurn(const Photo& photo, glm::ivec2 size, PhotoDepth& depth, Jo
     if (photo.orientation == 1) return {};
     const glm::ivec2 upright = photo.uprightSize(photo.colour);
     const bool sideways = upright != glm::ivec2(photo.colour.width, photo.colour.height);
-    if (!sideways || sameShape(upright, {upright.y, upright.x}))
-        depth.turned = fmt::format(
-            "its depth, '{}', is taken as upright, which its size cannot tell", depth.source.name);
-    else if (!sameShape(size, upright) && sameShape(size, {upright.y, upright.x})) {
-        depth.orientation = photo.orientation;
-        depth.turned = fmt::format(
-            "its depth, '{}', lies as the sensor saw it and is turned as the "
-            "picture is",
-            depth.source.name);
-    }
+    auto turn = depthTurnOf(size, upright, sideways, depth.source.name);
+    if (turn.asPicture) depth.orientation = photo.orientation;
+    depth.turned = std::move(turn.note);
     return {};
 }
 
