@@ -28,6 +28,11 @@ constexpr double kDiagonal35 = 43.266615;  ///< of 36x24 mm
 /// A larger difference of fx and fy is of a matrix that is wrong: pixels of phones are square.
 constexpr double kMostOblong = 0.02;
 
+/// A focal length below this share of the picture's width (157 degrees across) is not in pixels:
+/// phones' widest lens has 0.36, and one in widths (at most 9, of 300 mm) of a picture of 400
+/// pixels would be 0.02.
+constexpr double kShortestFocal = 0.1;
+
 /// Endings of a depth picture beside its photo, in the order in which they are looked for.
 constexpr const char* kDepthEndings[] = {"_depth.tiff", "_depth.tif", "_depth.exr",
                                          "_depth.pfm",  "_depth.png", "_depth.jpg"};
@@ -217,7 +222,9 @@ Camera cameraOfPhoto(const Photo& photo, glm::ivec2 size, const ImageSetOptions&
     }
     if (photo.intrinsics) {
         const PhotoIntrinsics& k = *photo.intrinsics;
-        if (k.fx > 0 && k.fy > 0 && std::abs(k.fx / k.fy - 1) <= kMostOblong) {
+        const double shortest = kShortestFocal * size.x;
+        const bool normalised = k.fx > 0 && k.fy > 0 && k.fx < shortest && k.fy < shortest;
+        if (!normalised && k.fx > 0 && k.fy > 0 && std::abs(k.fx / k.fy - 1) <= kMostOblong) {
             camera.fx = k.fx;
             camera.fy = k.fy;
             camera.cx = k.cx;
@@ -225,9 +232,16 @@ Camera cameraOfPhoto(const Photo& photo, glm::ivec2 size, const ImageSetOptions&
             from = "matrix";
             return camera;
         }
-        notes.push_back(fmt::format(
-            "its intrinsic matrix is not used: fx {:.0f} and fy {:.0f} differ by more than {:g} %",
-            k.fx, k.fy, 100 * kMostOblong));
+        if (normalised)
+            notes.push_back(
+                fmt::format("its intrinsic matrix is not used: fx {:.3g} and fy {:.3g} look "
+                            "normalised, and pixels are expected",
+                            k.fx, k.fy));
+        else
+            notes.push_back(
+                fmt::format("its intrinsic matrix is not used: fx {:.0f} and fy {:.0f} differ by "
+                            "more than {:g} %",
+                            k.fx, k.fy, 100 * kMostOblong));
     }
     const double diagonal = std::hypot(size.x, size.y);
     from = photo.focal35 > 0 ? "focal35" : "assumed";
