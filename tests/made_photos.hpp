@@ -211,8 +211,8 @@ inline Bytes gdepthPhoto(std::size_t part = 400, const std::string& format = "Ra
                        "D:Near=\"1\" D:Far=\"9\" " + more, part);
 }
 
-/// Dynamic Depth: blurred, gain map, sharp, depth. `units` "Meters" and such.
-inline Bytes dynamicPhoto(const std::string& units = "Meters") {
+/// Dynamic Depth: blurred, gain map, sharp, depth. `units` "Meters" and such; `focal` of 64x48.
+inline Bytes dynamicPhoto(const std::string& units = "Meters", glm::dvec2 focal = {60, 60}) {
     const std::string base = "http://ns.google.com/photos/dd/1.0/";
     const Bytes gain = colourJpeg(8, 6), sharp = colourJpeg(), depth = depthJpeg();
     const auto item = [](const char* semantic, std::size_t length, const char* uri) {
@@ -229,7 +229,8 @@ inline Bytes dynamicPhoto(const std::string& units = "Meters") {
         "<M:Format>RangeLinear</M:Format><M:Near>0.5</M:Near><M:Far>8.5</M:Far><M:Units>" +
         units +
         "</M:Units><M:DepthURI>android/depthmap</M:DepthURI>"
-        "<K:FocalLengthX>60</K:FocalLengthX><K:FocalLengthY>60</K:FocalLengthY>"
+        "<K:FocalLengthX>" +
+        fmt::format("{}</K:FocalLengthX><K:FocalLengthY>{}</K:FocalLengthY>", focal.x, focal.y) +
         "<K:PrincipalPointX>30</K:PrincipalPointX><K:PrincipalPointY>26</K:PrincipalPointY>"
         "<K:ImageWidth>64</K:ImageWidth><K:ImageHeight>48</K:ImageHeight>";
     Bytes out =

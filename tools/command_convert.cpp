@@ -498,9 +498,9 @@ void addSetOptions(Command& c, const std::shared_ptr<ConvertOptions>& o) {
         .takes("N");
     c.flag(
         "--strict", o->open.set.strict,
-        "Stop at a view whose files are missing (transforms, TUM, 7-Scenes) or that has no usable "
-        "depth, instead of leaving it out, and at frames of films that are missing or damaged, "
-        "instead of showing the ones before");
+        "Stop at a view whose files are missing (transforms, TUM, 7-Scenes), whose pose is of lost "
+        "tracking (TUM, 7-Scenes, Open3D) or that has no usable depth, instead of leaving it out, "
+        "and at frames of films that are missing or damaged, instead of showing the ones before");
 }
 
 /// Where the files of a set are, and how to read them.

@@ -9,6 +9,7 @@
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/patterns.hpp"
+#include "formats/imagesets/pictures.hpp"
 #include "formats/video/film.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/model/sequence.hpp"
@@ -245,6 +246,21 @@ Result<std::vector<FilmPair>> openPairs(const std::vector<SetView>& views, const
     return pairs;
 }
 
+/// Turns depth as its colour is, where it does not say itself how it lies and its shape does.
+void turnDepth(const FilmPair& pair, Job& job) {
+    const auto trackOf = [](const Film& film) -> const Film::Track& {
+        return film.tracks()[static_cast<std::size_t>(film.firstVideo())];
+    };
+    const Film::Track &colour = trackOf(*pair.colour), &depth = trackOf(*pair.depth);
+    if (colour.turn.none() || !depth.turn.none()) return;
+    const DepthTurn turn =
+        depthTurnOf({depth.width, depth.height}, {colour.width, colour.height},
+                    colour.turn.sideways(), pair.depth->path().filename().string());
+    if (turn.asPicture) pair.depth->turn(colour.turn);
+    if (!turn.note.empty())
+        job.note(fmt::format("{}: {}", inQuotes(pair.colour->path().string()), turn.note));
+}
+
 /// Adds the frames of a pair as views of a set, each with its pose.
 Result<void> addFrames(const FilmPair& pair, const std::vector<SetView>& views,
                        const std::vector<Distances>& distances, const std::string& where, Job& job,
@@ -299,8 +315,10 @@ Result<SetDescription> describeFilms(const path& given, const ImageSetOptions& o
     std::uint64_t count = 0;
     for (const FilmPair& pair : pairs) count += static_cast<std::uint64_t>(pair.depth->count());
     STX_CHECK(checkViewCount(count, job.limits, where));
-    for (const FilmPair& pair : pairs)
+    for (const FilmPair& pair : pairs) {
+        turnDepth(pair, job);
         STX_CHECK(addFrames(pair, views, distances, where, job, set));
+    }
     return set;
 }
 

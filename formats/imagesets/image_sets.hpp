@@ -40,8 +40,9 @@ struct ImageSetOptions {
     /// value: as the kind of set usually is (recordings of a moving camera are of one moment).
     std::optional<bool> moving;
     int every = 1;  ///< takes each N-th view, for recordings of thousands
-    /// A view whose files are missing (transforms, TUM, 7-Scenes) or of which no pixel has a usable
-    /// depth is an error, not a note, and so is a picture of a film that is missing or damaged.
+    /// A view whose files are missing (transforms, TUM, 7-Scenes), whose pose is of lost tracking
+    /// (TUM, 7-Scenes, Open3D) or of which no pixel has a usable depth is an error, not a note, and
+    /// so is a picture of a film that is missing or damaged.
     bool strict = false;
     /// The set is one of many, which may be of other kinds: options that its kind does not take are
     /// noted and not refused.

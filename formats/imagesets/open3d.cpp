@@ -24,6 +24,7 @@ struct LoggedPose {
     glm::dmat3 rotation = glm::dmat3(1.0);
     glm::dvec3 centre = glm::dvec3(0.0);
     std::string where;
+    bool lost = false;  ///< tracking was
 };
 
 Result<std::vector<LoggedPose>> parseLog(std::string_view text) {
@@ -49,7 +50,8 @@ Result<std::vector<LoggedPose>> parseLog(std::string_view text) {
             if (words.size() != 4)
                 return failAt(line.where(), ErrorCode::invalidInput,
                               "{} numbers; a row of 4 is expected", words.size());
-            STX_TRY(const auto n, numbersOf(words, 0, 4, line.where()));
+            STX_TRY(const auto n, numbersOf(words, 0, 4, line.where(), Numbers::any));
+            pose.lost = pose.lost || !isTracked(n);
             const auto r = static_cast<int>(row);
             for (int column = 0; column < 3; ++column)
                 pose.rotation[column][r] = n[static_cast<std::size_t>(column)];
@@ -101,6 +103,9 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
     const std::string logWhere = inQuotes((folder / log).string());
     STX_TRY(const auto bytes, readFile(folder / log, job.limits));
     STX_TRY(const auto poses, within(logWhere, parseLog(textOf(bytes))));
+    const auto lost = std::ranges::count(poses, true, &LoggedPose::lost);
+    STX_CHECK(
+        noteLost(static_cast<std::size_t>(lost), poses.size(), logWhere, options.strict, job));
     std::string colourFolder = "rgb";
     for (const char* name : {"image", "color"})
         if (std::filesystem::is_directory(folder / name, ec)) colourFolder = name;
@@ -129,6 +134,7 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
             return failAt(logWhere + ": " + pose.where, ErrorCode::invalidInput,
                           "a pose of frame {}, but there are {} pictures", pose.frame,
                           colours.size());
+        if (pose.lost) continue;
         posed[pose.frame] = true;
         SetView view;
         view.name = path(colours[pose.frame]).stem().string();

@@ -28,6 +28,11 @@ constexpr double kDiagonal35 = 43.266615;  ///< of 36x24 mm
 /// A larger difference of fx and fy is of a matrix that is wrong: pixels of phones are square.
 constexpr double kMostOblong = 0.02;
 
+/// A focal length below this share of the picture's width (157 degrees across) is not in pixels:
+/// phones' widest lens has 0.36, and one in widths (at most 9, of 300 mm) of a picture of 400
+/// pixels would be 0.02.
+constexpr double kShortestFocal = 0.1;
+
 /// Endings of a depth picture beside its photo, in the order in which they are looked for.
 constexpr const char* kDepthEndings[] = {"_depth.tiff", "_depth.tif", "_depth.exr",
                                          "_depth.pfm",  "_depth.png", "_depth.jpg"};
@@ -131,7 +136,7 @@ Result<void> readBesideCode(const path& file, const ImageSetOptions& options, in
 }
 
 /// How depth of that size, as it is stored beside the photo, is turned: by its own orientation;
-/// without one as the picture, where only the picture as it is stored has the same shape.
+/// without one as depthTurnOf() says.
 Result<void> findTurn(const Photo& photo, glm::ivec2 size, PhotoDepth& depth, Job& job) {
     STX_TRY(const auto bytes, readFile(depth.source.path, job.limits));
     if (const ExifNotes own = readExif(bytes); own.oriented) {
@@ -141,16 +146,9 @@ Result<void> findTurn(const Photo& photo, glm::ivec2 size, PhotoDepth& depth, Jo
     if (photo.orientation == 1) return {};
     const glm::ivec2 upright = photo.uprightSize(photo.colour);
     const bool sideways = upright != glm::ivec2(photo.colour.width, photo.colour.height);
-    if (!sideways || sameShape(upright, {upright.y, upright.x}))
-        depth.turned = fmt::format(
-            "its depth, '{}', is taken as upright, which its size cannot tell", depth.source.name);
-    else if (!sameShape(size, upright) && sameShape(size, {upright.y, upright.x})) {
-        depth.orientation = photo.orientation;
-        depth.turned = fmt::format(
-            "its depth, '{}', lies as the sensor saw it and is turned as the "
-            "picture is",
-            depth.source.name);
-    }
+    auto turn = depthTurnOf(size, upright, sideways, depth.source.name);
+    if (turn.asPicture) depth.orientation = photo.orientation;
+    depth.turned = std::move(turn.note);
     return {};
 }
 
@@ -224,7 +222,9 @@ Camera cameraOfPhoto(const Photo& photo, glm::ivec2 size, const ImageSetOptions&
     }
     if (photo.intrinsics) {
         const PhotoIntrinsics& k = *photo.intrinsics;
-        if (k.fx > 0 && k.fy > 0 && std::abs(k.fx / k.fy - 1) <= kMostOblong) {
+        const double shortest = kShortestFocal * size.x;
+        const bool normalised = k.fx > 0 && k.fy > 0 && k.fx < shortest && k.fy < shortest;
+        if (!normalised && k.fx > 0 && k.fy > 0 && std::abs(k.fx / k.fy - 1) <= kMostOblong) {
             camera.fx = k.fx;
             camera.fy = k.fy;
             camera.cx = k.cx;
@@ -232,9 +232,16 @@ Camera cameraOfPhoto(const Photo& photo, glm::ivec2 size, const ImageSetOptions&
             from = "matrix";
             return camera;
         }
-        notes.push_back(fmt::format(
-            "its intrinsic matrix is not used: fx {:.0f} and fy {:.0f} differ by more than {:g} %",
-            k.fx, k.fy, 100 * kMostOblong));
+        if (normalised)
+            notes.push_back(
+                fmt::format("its intrinsic matrix is not used: fx {:.3g} and fy {:.3g} look "
+                            "normalised, and pixels are expected",
+                            k.fx, k.fy));
+        else
+            notes.push_back(
+                fmt::format("its intrinsic matrix is not used: fx {:.0f} and fy {:.0f} differ by "
+                            "more than {:g} %",
+                            k.fx, k.fy, 100 * kMostOblong));
     }
     const double diagonal = std::hypot(size.x, size.y);
     from = photo.focal35 > 0 ? "focal35" : "assumed";

@@ -272,6 +272,18 @@ bool sameShape(glm::ivec2 a, glm::ivec2 b) {
     return difference <= std::max({a.x, a.y, b.x, b.y});
 }
 
+DepthTurn depthTurnOf(glm::ivec2 size, glm::ivec2 upright, bool sideways, const std::string& name) {
+    const glm::ivec2 stored(upright.y, upright.x);
+    if (!sideways || sameShape(upright, stored))
+        return {false, fmt::format("its depth, '{}', is taken as upright, which its size cannot "
+                                   "tell",
+                                   name)};
+    if (sameShape(size, upright) || !sameShape(size, stored)) return {};
+    return {true, fmt::format("its depth, '{}', lies as the sensor saw it and is turned as the "
+                              "picture is",
+                              name)};
+}
+
 Result<Image<float>> parsePfm(ByteSpan bytes, std::string_view name, const Limits& limits) {
     const std::string_view text = textOf(bytes).substr(0, 200);
     const auto complain = [&] {

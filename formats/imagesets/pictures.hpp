@@ -28,6 +28,17 @@ struct StoredDepth {
 /// Two images of these sizes have the same shape but for the rounding of one pixel.
 [[nodiscard]] bool sameShape(glm::ivec2 a, glm::ivec2 b);
 
+/// How depth lies that does not say itself how it is turned, beside a picture that does.
+struct DepthTurn {
+    bool asPicture = false;  ///< as the sensor saw it: it is to be turned as the picture
+    std::string note;        ///< what a person should know of that
+};
+/// `size` of the depth as it is stored, `upright` of the picture as it is shown; `sideways`: the
+/// picture's turn swaps its sides. It is turned where only the picture as it is stored has the same
+/// shape.
+[[nodiscard]] DepthTurn depthTurnOf(glm::ivec2 size, glm::ivec2 upright, bool sideways,
+                                    const std::string& name);
+
 /// `PF`/`Pf` files: floats, rows from the bottom, a negative scale for little-endian.
 [[nodiscard]] Result<Image<float>> parsePfm(ByteSpan bytes, std::string_view name,
                                             const Limits& limits);

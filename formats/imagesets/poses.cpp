@@ -1,6 +1,9 @@
 #include "formats/imagesets/poses.hpp"
 
+#include <algorithm>
 #include <cmath>
+
+#include "lib/base/counted.hpp"
 
 namespace stx::imagesets {
 
@@ -61,6 +64,21 @@ Camera cameraFromVision(const VisionCamera& v) {
     c.cx = v.cx;
     c.cy = v.cy;
     return c;
+}
+
+bool isTracked(std::span<const double> pose) {
+    return std::ranges::all_of(pose, [](double value) { return std::isfinite(value); });
+}
+
+Result<void> noteLost(std::size_t lost, std::size_t all, const std::string& where, bool strict,
+                      Job& job) {
+    if (lost == 0) return {};
+    const std::string found =
+        fmt::format("{} of {} {} of lost tracking (nan, inf or a quaternion of 0)", lost,
+                    counted(all, "pose"), lost == 1 ? "is" : "are");
+    if (strict || lost == all) return failAt(where, ErrorCode::invalidInput, "{}", found);
+    job.note(fmt::format("{}: {} and {} left out", where, found, lost == 1 ? "is" : "are"));
+    return {};
 }
 
 Result<glm::dmat3> rotationFromQuaternion(glm::dvec4 xyzw, const std::string& where) {

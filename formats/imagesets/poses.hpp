@@ -41,6 +41,13 @@ struct VisionCamera {
 /// everything else in it; sets are of one kind throughout.
 [[nodiscard]] Camera cameraFromVision(const VisionCamera& vision);
 
+/// Whether the numbers of a pose are those of a camera. Trackers that lost their way write nan or
+/// inf.
+[[nodiscard]] bool isTracked(std::span<const double> pose);
+/// Says that so many of a file's poses are of lost tracking. Errors when all are, or `strict`.
+[[nodiscard]] Result<void> noteLost(std::size_t lost, std::size_t all, const std::string& where,
+                                    bool strict, Job& job);
+
 /// Rotation of a quaternion x y z w, which need not be unit. Errors when it is zero or not finite.
 [[nodiscard]] Result<glm::dmat3> rotationFromQuaternion(glm::dvec4 xyzw, const std::string& where);
 

@@ -70,14 +70,23 @@ void makeAllLinear(std::vector<ReferenceView>& views) {
 
 Result<void> dropMissing(SetDescription& set, bool strict, Job& job) {
     const auto isMissing = [](const SetView& view) { return view.missing.has_value(); };
-    const auto first = std::ranges::find_if(set.views, isMissing);
-    if (first == set.views.end()) return {};
-    const auto all = set.views.size();
-    const Error error = *first->missing;
-    const auto dropped = std::erase_if(set.views, isMissing);
-    if (strict || set.views.empty()) return tl::unexpected(error);
-    job.note(fmt::format("{} of {} views {} left out, as files are missing; the first: {}", dropped,
-                         all, dropped == 1 ? "is" : "are", error.text()));
+    const auto missing = std::ranges::count_if(set.views, isMissing);
+    if (missing == 0) return {};
+    const auto all = std::ssize(set.views);
+    if (strict || missing == all)
+        return tl::unexpected(*std::ranges::find_if(set.views, isMissing)->missing);
+    for (const bool lost : {false, true}) {
+        const auto isThis = [&](const SetView& view) {
+            return isMissing(view) && view.lost == lost;
+        };
+        const auto first = std::ranges::find_if(set.views, isThis);
+        if (first == set.views.end()) continue;
+        const Error error = *first->missing;
+        const auto dropped = std::erase_if(set.views, isThis);
+        job.note(fmt::format("{} of {} views {} left out, as {}; the first: {}", dropped, all,
+                             dropped == 1 ? "is" : "are",
+                             lost ? "tracking was lost" : "files are missing", error.text()));
+    }
     return {};
 }
 

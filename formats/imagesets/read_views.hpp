@@ -18,7 +18,8 @@
 /// when they are asked for.
 namespace stx::imagesets {
 
-/// Leaves out views whose files are not there, and says so. Errors when none is left, or `strict`.
+/// Leaves out views whose files or poses are not there, and says so. Errors when none is left, or
+/// `strict`.
 [[nodiscard]] Result<void> dropMissing(SetDescription& set, bool strict, Job& job);
 /// Errors with the first file of a view that is not there.
 [[nodiscard]] Result<void> checkFilesAreThere(const SetDescription& set);

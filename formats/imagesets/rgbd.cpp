@@ -139,9 +139,13 @@ std::vector<Frame> associate(const std::vector<TimedName>& colours,
 }
 
 Result<std::vector<TimedPose>> readTrajectory(const path& folder, const std::string& file,
-                                              Job& job) {
+                                              bool strict, Job& job) {
     STX_TRY(const auto bytes, readFile(folder / file, job.limits));
-    return within(inQuotes((folder / file).string()), parseTrajectory(textOf(bytes)));
+    const std::string where = inQuotes((folder / file).string());
+    STX_TRY(auto poses, within(where, parseTrajectory(textOf(bytes))));
+    const auto lost = std::ranges::count(poses, true, &TimedPose::lost);
+    STX_CHECK(noteLost(static_cast<std::size_t>(lost), poses.size(), where, strict, job));
+    return poses;
 }
 
 /// Files named by a number (`17.png`), by that number.
@@ -158,8 +162,8 @@ std::vector<std::pair<int, std::string>> numbered(const path& folder, const std:
 
 /// color/N, depth/N and a line for each in pose.txt.
 Result<std::vector<Frame>> framesByNumber(const path& folder, const std::string& colourFolder,
-                                          const std::string& trajectory, Job& job) {
-    STX_TRY(const auto poses, readTrajectory(folder, trajectory, job));
+                                          const std::string& trajectory, bool strict, Job& job) {
+    STX_TRY(const auto poses, readTrajectory(folder, trajectory, strict, job));
     const auto colours = numbered(folder, colourFolder);
     const auto depths = numbered(folder, "depth");
     const std::string where = inQuotes(folder.string());
@@ -179,14 +183,14 @@ Result<std::vector<Frame>> framesByNumber(const path& folder, const std::string&
             return failAt(inQuotes((folder / trajectory).string()), ErrorCode::invalidInput,
                           "{} poses, but there are images up to number {}", poses.size(),
                           colours.back().first);
-        frames.push_back({static_cast<double>(number), name, depth->second,
-                          poses[static_cast<std::size_t>(line)]});
+        const TimedPose& pose = poses[static_cast<std::size_t>(line)];
+        if (!pose.lost) frames.push_back({static_cast<double>(number), name, depth->second, pose});
     }
     return frames;
 }
 
 Result<std::vector<Frame>> framesByTime(const path& folder, const std::string& trajectory,
-                                        Job& job) {
+                                        bool strict, Job& job) {
     std::vector<Frame> frames;
     const std::string list =
         firstThere(folder, {"associations.txt", "associate.txt", "associated.txt"});
@@ -213,7 +217,8 @@ Result<std::vector<Frame>> framesByTime(const path& folder, const std::string& t
                 fmt::format("{} of {} colour images have no depth within {} s and are left out",
                             colours.size() - frames.size(), colours.size(), kSameTime));
     }
-    STX_TRY(auto poses, readTrajectory(folder, trajectory, job));
+    STX_TRY(auto poses, readTrajectory(folder, trajectory, strict, job));
+    std::erase_if(poses, [](const TimedPose& pose) { return pose.lost; });
     std::sort(poses.begin(), poses.end(), [](auto& a, auto& b) { return a.time < b.time; });
     std::vector<Frame> posed;
     for (Frame& frame : frames) {
@@ -240,11 +245,17 @@ Result<std::vector<TimedPose>> parseTrajectory(std::string_view text) {
                 "{} numbers; 't tx ty tz qx qy qz qw', or the same without t, is expected",
                 words.size());
         const std::size_t first = words.size() - 7;
-        STX_TRY(const auto n, numbersOf(words, first, 7, line.where()));
+        STX_TRY(const auto n, numbersOf(words, first, 7, line.where(), Numbers::any));
         TimedPose pose;
         pose.time = static_cast<double>(poses.size());
         if (first == 1) {
             STX_TRY(pose.time, numberOf(words[0], line.where()));
+        }
+        const bool noTurn = n[3] == 0 && n[4] == 0 && n[5] == 0 && n[6] == 0;
+        pose.lost = noTurn || !isTracked(n);
+        if (pose.lost) {
+            poses.push_back(pose);
+            continue;
         }
         pose.position = {n[0], n[1], n[2]};
         const double length = std::hypot(std::hypot(n[3], n[4]), std::hypot(n[5], n[6]));
@@ -294,8 +305,9 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
     const bool icl = !timed || trajectory.ends_with(".gt.freiburg");
     const std::string colourFolder =
         std::filesystem::is_directory(folder / "color", ec) ? "color" : "rgb";
-    STX_TRY(auto frames, timed ? framesByTime(folder, trajectory, job)
-                               : framesByNumber(folder, colourFolder, trajectory, job));
+    STX_TRY(auto frames,
+            timed ? framesByTime(folder, trajectory, options.strict, job)
+                  : framesByNumber(folder, colourFolder, trajectory, options.strict, job));
     if (frames.empty())
         return failAt(where, ErrorCode::invalidInput,
                       "no colour image has both a depth image and a pose of its time");

@@ -79,9 +79,10 @@ struct SetView {
     /// Reads both, for kinds whose images are not files of their own.
     std::function<Result<StoredView>(const SetView&, Job&)> load;
 
-    /// Why one of its files is not there; the view is left out then, unless the set is read
-    /// strictly.
+    /// Why one of its files or its pose is not there; the view is left out then, unless the set is
+    /// read strictly.
     std::optional<Error> missing;
+    bool lost = false;  ///< with `missing`: what is not there is its pose
 
     Distances distances;  ///< null: the stored values are distances already
     /// What other pictures of the set show of it. The values come without stairs. Null: none can

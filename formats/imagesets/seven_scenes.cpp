@@ -55,7 +55,7 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
     for (const std::string& stem : stems) {
         const std::string poseName = stem + ".pose.txt";
         const std::string place = inQuotes((given / poseName).string());
-        STX_TRY(const auto n, numbersIn(given / poseName, job.limits, 16));
+        STX_TRY(const auto n, numbersIn(given / poseName, job.limits, 16, Numbers::any));
         if (n.size() != 16)
             return failAt(place, ErrorCode::invalidInput, "{} numbers; 4 rows of 4 are expected",
                           n.size());
@@ -63,6 +63,12 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
         view.name = stem;
         STX_CHECK(
             findPictures(given, stem + ".color.png", stem + ".depth.png", where, job.limits, view));
+        if (!view.missing && !isTracked(n)) {
+            view.lost = true;
+            // The error that names the line.
+            view.missing = numbersIn(given / poseName, job.limits, 16).error();
+            view.missing->message += ", as tracking was lost";
+        }
         if (view.missing) {
             set.views.push_back(std::move(view));
             continue;

@@ -36,36 +36,36 @@ std::string_view textOf(ByteSpan bytes) {
     return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-Result<double> numberOf(std::string_view word, const std::string& where) {
+Result<double> numberOf(std::string_view word, const std::string& where, Numbers which) {
     const auto value = wholeNumber<double>(word.substr(word.starts_with('+') ? 1 : 0));
-    if (!value || !std::isfinite(*value))
-        return failAt(where, ErrorCode::invalidInput, "'{}' where a finite number is expected",
-                      word.substr(0, 40));
+    if (!value || (which == Numbers::finite && !std::isfinite(*value)))
+        return failAt(where, ErrorCode::invalidInput, "'{}' where a {}number is expected",
+                      word.substr(0, 40), which == Numbers::finite ? "finite " : "");
     return *value;
 }
 
 Result<std::vector<double>> numbersOf(const std::vector<std::string_view>& words, std::size_t first,
-                                      std::size_t count, const std::string& where) {
+                                      std::size_t count, const std::string& where, Numbers which) {
     if (words.size() < first + count)
         return failAt(where, ErrorCode::invalidInput, "{} values; {} are expected", words.size(),
                       first + count);
     std::vector<double> out;
     for (std::size_t i = 0; i < count; ++i) {
-        STX_TRY(const double value, numberOf(words[first + i], where));
+        STX_TRY(const double value, numberOf(words[first + i], where, which));
         out.push_back(value);
     }
     return out;
 }
 
 Result<std::vector<double>> numbersIn(const std::filesystem::path& file, const Limits& limits,
-                                      std::size_t most) {
+                                      std::size_t most, Numbers which) {
     STX_TRY(const auto bytes, readFile(file, limits));
     const std::string where = inQuotes(file.string());
     std::vector<double> out;
     for (const TextLine& line : linesOf(textOf(bytes))) {
         if (out.size() > most) break;
         for (const auto word : line.words()) {
-            STX_TRY(const double value, within(where, numberOf(word, line.where())));
+            STX_TRY(const double value, within(where, numberOf(word, line.where(), which)));
             out.push_back(value);
         }
     }

@@ -23,15 +23,21 @@ struct TextLine {
 
 [[nodiscard]] std::string_view textOf(ByteSpan bytes);
 
-/// A finite number that is the whole word.
-[[nodiscard]] Result<double> numberOf(std::string_view word, const std::string& where);
+/// Which words are numbers: `any` takes nan and inf, too.
+enum class Numbers { finite, any };
+
+/// A number that is the whole word.
+[[nodiscard]] Result<double> numberOf(std::string_view word, const std::string& where,
+                                      Numbers which = Numbers::finite);
 /// `count` numbers that are the words [first, first + count).
 [[nodiscard]] Result<std::vector<double>> numbersOf(const std::vector<std::string_view>& words,
                                                     std::size_t first, std::size_t count,
-                                                    const std::string& where);
+                                                    const std::string& where,
+                                                    Numbers which = Numbers::finite);
 /// All numbers of a text file; lines are read until there are more than `most`.
 [[nodiscard]] Result<std::vector<double>> numbersIn(const std::filesystem::path& file,
                                                     const Limits& limits,
-                                                    std::size_t most = SIZE_MAX);
+                                                    std::size_t most = SIZE_MAX,
+                                                    Numbers which = Numbers::finite);
 
 }  // namespace stx::imagesets

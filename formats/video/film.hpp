@@ -48,6 +48,9 @@ class Film {
     /// Chooses a track, before anything below. Errors as open(), and no picture in it.
     [[nodiscard]] Result<void> select(int track);
 
+    /// Turns its pictures so, and not as its track says. After select().
+    void turn(video::Turn how) { turn_ = how; }
+
     /// When its pictures are shown, seconds by the file's clock, ascending, each once.
     [[nodiscard]] const std::vector<double>& times() const { return times_; }
     /// How long the last one is shown, seconds; 0: not told.

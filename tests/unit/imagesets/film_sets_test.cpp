@@ -112,6 +112,74 @@ TEST(FilmPairs, FramesAreMatchedByTime) {
     })) << fmt::format("{}", fmt::join(notes, "\n"));
 }
 
+/// Films whose colour is turned by what its file says.
+class TurnedPair {
+  public:
+    explicit TurnedPair(int degrees) : across_(degrees != 180) {
+        writeFilms(folder_);
+        films::ffmpeg(
+            folder_.path(),
+            fmt::format("-i colour.mp4 -c copy -metadata:s:v:0 rotate={} turned.mp4", degrees));
+        // The same depth with a turn of its own, and upright.
+        films::ffmpeg(folder_.path(), "-i depth.mkv -c:v rawvideo -pix_fmt gray16be still.mov");
+        films::ffmpeg(
+            folder_.path(),
+            fmt::format("-i still.mov -c copy -metadata:s:v:0 rotate={} own.mov", degrees));
+        films::ffmpeg(folder_.path(), "-i own.mov -c:v ffv1 -pix_fmt gray16le upright.mkv");
+        sets::writeText(
+            folder_ / "camera.json",
+            fmt::format("{{\"w\":{},\"h\":{},\"fl_x\":30,\"integer_depth_scale\":0.001,"
+                        "\"frames\":[{}]}}",
+                        across_ ? kHeight : kWidth, across_ ? kWidth : kHeight, pose(0)));
+    }
+
+    /// The depth of a frame; `notes` gets what is said.
+    Image<float> depth(const std::string& film, std::string& notes) const {
+        ImageSetOptions options = filmOptions();
+        options.texturePattern = "turned.mp4";
+        options.depthPattern = film;
+        Job job;
+        const auto read = openImageSet(folder_ / "camera.json", options, job);
+        EXPECT_TRUE(read) << read.error().text();
+        if (!read) return {};
+        const auto bundle = (*read)->frame(3, job);
+        EXPECT_TRUE(bundle) << bundle.error().text();
+        if (!bundle) return {};
+        notes.clear();
+        for (const std::string& note : job.takeNotes()) notes += note + "\n";
+        return bundle->views[0].depth;
+    }
+
+  private:
+    TemporaryFolder folder_;
+    bool across_;
+};
+
+TEST(FilmPairs, DepthLiesAsTheColourThatIsTurned) {
+    REQUIRE_VIDEO();
+    for (const int degrees : {90, 270, 180}) {
+        SCOPED_TRACE(degrees);
+        const TurnedPair films(degrees);
+        const bool across = degrees != 180;
+        std::string notes;
+        const auto own = films.depth("own.mov", notes);
+        EXPECT_EQ(notes.find("its depth, "), std::string::npos) << notes;
+        const auto upright = films.depth("upright.mkv", notes);
+        EXPECT_TRUE(std::ranges::equal(upright.pixels(), own.pixels()));
+        EXPECT_EQ(notes.find("'upright.mkv', is taken as upright, which its size cannot tell") !=
+                      std::string::npos,
+                  !across)
+            << notes;
+        EXPECT_EQ(notes.find("lies as the sensor saw it"), std::string::npos) << notes;
+        if (!across) continue;
+        const auto stored = films.depth("depth.mkv", notes);
+        EXPECT_TRUE(std::ranges::equal(stored.pixels(), own.pixels()));
+        EXPECT_NE(notes.find("'depth.mkv', lies as the sensor saw it and is turned as the picture"),
+                  std::string::npos)
+            << notes;
+    }
+}
+
 TEST(FilmPairs, GoOnWhereAPictureIsDamaged) {
     REQUIRE_VIDEO();
     const TemporaryFolder folder;

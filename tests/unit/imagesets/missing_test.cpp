@@ -78,9 +78,26 @@ TEST(MissingFiles, FramesOfTransformsWithoutDepthAreLeftOut) {
     expectError(readSet(set), {"frames[0]", "depth_file_path"});
 }
 
-TEST(MissingFiles, OfRecordingsLeaveTheirViewOut) {
+/// A set whose pose of a frame is lost has the others and a note of that; read strictly it is an
+/// error.
+void expectLost(const std::filesystem::path& set, std::initializer_list<const char*> said,
+                std::size_t left = 2) {
+    Job job;
+    const auto read = readImageSet(set, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    EXPECT_EQ(read->views.size(), left);
+    std::string all;
+    for (const std::string& note : job.takeNotes()) all += note + "\n";
+    for (const char* part : said)
+        EXPECT_NE(all.find(part), std::string::npos) << part << " is missing in: " << all;
+    ImageSetOptions strict;
+    strict.strict = true;
+    EXPECT_FALSE(readSet(set, strict));
+}
+
+/// The same three views in the layouts of TUM and 7-Scenes.
+void writeRecordings(const TemporaryFolder& tum, const TemporaryFolder& scenes) {
     const auto views = roomViews(3);
-    TemporaryFolder tum, scenes;
     std::string rgb, depth, poses;
     for (std::size_t i = 0; i < 3; ++i) {
         const auto& v = views[i];
@@ -106,6 +123,11 @@ TEST(MissingFiles, OfRecordingsLeaveTheirViewOut) {
     writeText(tum / "rgb.txt", rgb);
     writeText(tum / "depth.txt", depth);
     writeText(tum / "groundtruth.txt", poses);
+}
+
+TEST(MissingFiles, OfRecordingsLeaveTheirViewOut) {
+    const TemporaryFolder tum, scenes;
+    writeRecordings(tum, scenes);
     std::filesystem::remove(tum / "0.png");
     expectTwoOfThree(tum.path(), "0.png");
     std::filesystem::remove(scenes / "frame-000002.depth.png");
@@ -160,6 +182,83 @@ TEST(NoDepthAtAll, OfAllViewsIsAnError) {
     const auto set = writeSetWithDarkViews(folder, {0, 1, 2});
     Job job;
     expectError(readImageSet(set, {}, job), {"v0.exr", "valid depth"});
+}
+
+/// Trackers that lost their way write poses that are no numbers, or quaternions of 0.
+TEST(LostTracking, LeavesTheFrameOut) {
+    for (const char* lost : {"nan nan nan nan nan nan nan", "1 2 3 0 0 0 0", "0 0 0 -inf 0 0 1"}) {
+        SCOPED_TRACE(lost);
+        const TemporaryFolder tum, scenes;
+        writeRecordings(tum, scenes);
+        const auto bytes = readFile(tum / "groundtruth.txt", Job().limits);
+        ASSERT_TRUE(bytes);
+        std::string poses(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+        const auto first = poses.find('\n') + 1, second = poses.find('\n', first);
+        poses.replace(first, second - first, std::string("1.0 ") + lost);
+        writeText(tum / "groundtruth.txt", poses);
+        expectLost(tum.path(), {"groundtruth.txt", "1 of 3 poses"});
+    }
+    const TemporaryFolder tum, scenes;
+    writeRecordings(tum, scenes);
+    writeText(scenes / "frame-000001.pose.txt",
+              "-inf -inf -inf -inf\n-inf -inf -inf -inf\n-inf -inf -inf -inf\n0 0 0 1\n");
+    expectLost(scenes.path(), {"1 of 3 views", "frame-000001.pose.txt"});
+    // What is no number at all is a file that is broken.
+    writeText(scenes / "frame-000001.pose.txt", "x 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+    expectError(readSet(scenes.path()), {"frame-000001.pose.txt", "line 1", "'x'"});
+}
+
+TEST(LostTracking, OfOpen3dLeavesTheFrameOut) {
+    const auto views = roomViews(1);
+    const TemporaryFolder folder;
+    for (const char* name : {"0.png", "1.png"}) {
+        writeColour(folder / "color" / name, views[0]);
+        writeCodes(folder / "depth" / name, 96, 64, 16, [](int, int) { return 2000; });
+    }
+    writeText(folder / "trajectory.log",
+              "0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+              "1 1 2\nnan nan nan nan\nnan nan nan nan\nnan nan nan nan\n0 0 0 1\n");
+    expectLost(folder.path(), {"1 of 2 pictures", "trajectory.log"}, 1);
+}
+
+TEST(LostTracking, OfPosesByNumberLeavesTheirFrameOut) {
+    const auto views = roomViews(3);
+    const TemporaryFolder folder;
+    for (const int i : {0, 1, 2}) {
+        writeColour(folder / fmt::format("color/{}.png", i), views[static_cast<std::size_t>(i)]);
+        writeCodes(folder / fmt::format("depth/{}.png", i), 96, 64, 16,
+                   [](int, int) { return 9000; });
+    }
+    writeText(folder / "intrinsics.txt", "60 60 47.5 31.5\n");
+    writeText(folder / "pose.txt", "1 0 0 0 0 0 1\n0 0 0 0 0 0 0\n3 0 0 0 0 0 1\n");
+    expectLost(folder.path(), {"pose.txt", "1 of 3 poses"});
+    const auto read = readSet(folder.path());
+    ASSERT_TRUE(read);
+    EXPECT_EQ((*read).views[0].camera.position.x, 1);
+    EXPECT_EQ((*read).views[1].camera.position.x, 3);
+}
+
+TEST(LostTracking, OfAllPosesIsAnError) {
+    const TemporaryFolder tum, scenes;
+    writeRecordings(tum, scenes);
+    writeText(tum / "groundtruth.txt", "0.0 nan nan nan 0 0 0 1\n1.0 0 0 0 0 0 0 0\n");
+    expectError(readSet(tum.path()), {"groundtruth.txt", "2 of 2 poses are of lost tracking"});
+    for (const int i : {0, 1, 2})
+        writeText(scenes / fmt::format("frame-00000{}.pose.txt", i),
+                  "nan nan nan NaN\nnan nan nan -nan\nnan nan inf nan\n0 0 0 1\n");
+    expectError(readSet(scenes.path()),
+                {"frame-000000.pose.txt", "line 1: 'nan'", "tracking was lost"});
+}
+
+TEST(LostTracking, AndMissingFilesAreCountedEach) {
+    const TemporaryFolder tum, scenes;
+    writeRecordings(tum, scenes);
+    writeText(scenes / "frame-000001.pose.txt", "inf 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+    std::filesystem::remove(scenes / "frame-000002.depth.png");
+    expectLost(scenes.path(),
+               {"1 of 3 views is left out, as files are missing; the first: ",
+                "1 of 3 views is left out, as tracking was lost; the first: "},
+               1);
 }
 
 }  // namespace

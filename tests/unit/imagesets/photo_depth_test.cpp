@@ -129,6 +129,30 @@ TEST(PhotoDepth, OneCodeIsSomewhereInTheRange) {
     EXPECT_LT(read->views[0].depth.at(5, 5), 10);
 }
 
+TEST(PhotoDepth, FocalLengthsThatAreNotInPixelsAreNotUsed) {
+    const struct {
+        glm::dvec2 focal;
+        std::string_view said;
+    } kCases[] = {{{60, 60}, ""},
+                  {{0.9, 1.2}, "look normalised, and pixels are expected"},
+                  {{0.9, 0.9}, "look normalised, and pixels are expected"},
+                  {{40, 60}, "differ by more than 2 %"}};
+    for (const auto& [focal, said] : kCases) {
+        const TemporaryFolder folder;
+        writeBytes(folder / "a.jpg", made::dynamicPhoto("Meters", focal));
+        ImageSetOptions options;
+        options.refine = *RefineSettings::from("off");
+        Job job;
+        const auto read = readImageSet(folder / "a.jpg", options, job);
+        ASSERT_TRUE(read) << read.error().text();
+        std::string notes;
+        for (const std::string& note : job.takeNotes()) notes += note + "\n";
+        EXPECT_EQ(notes.find("its intrinsic matrix is not used") == std::string::npos, said.empty())
+            << notes;
+        EXPECT_NE(notes.find(said), std::string::npos) << notes;
+    }
+}
+
 TEST(PhotoDepth, OptionsThatDoNotGoTogetherAreRefused) {
     GreyBeside photo(16);
     photo.options.depthUnit = 0.001;
