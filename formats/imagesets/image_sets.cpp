@@ -58,12 +58,11 @@ Result<SetDescription> describeFiles(const path& path, const ImageSetOptions& op
         return fail(ErrorCode::usage, "'{}' is not a kind of image set; known are {}", kind, known);
     }
     // A folder may be taken for a panorama's because files of its own kind are missing: what it
-    // lacks is said first.
-    const bool lastResort = kind == "panorama";
-    if (!lastResort) STX_CHECK(checkOptionsOf(kind, options, inQuotes(path.string()), job));
-    STX_TRY(auto set, entry->describe(path, options, job));
-    if (lastResort) STX_CHECK(checkOptionsOf(kind, options, inQuotes(path.string()), job));
-    return set;
+    // lacks is the error then.
+    ImageSetOptions checked = options;
+    checked.manyKinds = options.manyKinds || kind == "panorama";
+    STX_CHECK(checkOptionsOf(kind, checked, inQuotes(path.string()), job));
+    return entry->describe(path, options, job);
 }
 
 Result<void> checkOptions(const ImageSetOptions& o) {
