@@ -60,7 +60,7 @@ Result<SetDescription> describeFiles(const path& path, const ImageSetOptions& op
     // A folder may be taken for a panorama's because files of its own kind are missing: what it
     // lacks is the error then.
     ImageSetOptions checked = options;
-    checked.manyKinds = options.manyKinds || kind == "panorama";
+    checked.manyKinds = options.manyKinds || (kind == "panorama" && options.from != kind);
     STX_CHECK(checkOptionsOf(kind, checked, inQuotes(path.string()), job));
     return entry->describe(path, options, job);
 }
