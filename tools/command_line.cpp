@@ -138,20 +138,22 @@ Error usageError(const CLI::App& app, const CLI::ParseError& error, int argc, ch
         if (!unknown.empty() && std::find(known.begin(), known.end(), unknown) == known.end())
             return unknownCommand(unknown, known);
         unknown.clear();
-    } else if (const auto rest = where.remaining(); !rest.empty()) {
-        // "--" itself is known: what is behind it is an input.
-        const bool onlyInputs = rest[0] == "--" && rest.size() > 1;
-        unknown = rest[onlyInputs ? 1 : 0];
-        if (!onlyInputs) unknown = unknown.substr(0, unknown.find('='));
+    } else if (auto rest = where.remaining(); !rest.empty()) {
+        // "--" itself is known.
+        const bool onlyInputs = std::erase(rest, "--") > 0;
+        if (!rest.empty()) unknown = onlyInputs ? rest[0] : rest[0].substr(0, rest[0].find('='));
         for (const auto* option : where.get_options()) {
             for (const auto& name : option->get_lnames()) known.push_back("--" + name);
         }
-        if (onlyInputs)
+        if (unknown.empty()) {
+            // Something else is wrong, as the message says.
+        } else if (onlyInputs) {
             message = fmt::format("unexpected argument '{}'; behind '--' are inputs only", unknown);
-        else if (unknown.rfind("--", 0) == 0)
-            message = fmt::format("unknown option '{}'", unknown);
-        else
-            message = fmt::format("unexpected argument '{}'", unknown);
+        } else {
+            message = fmt::format(
+                "{} '{}'", unknown.starts_with("--") ? "unknown option" : "unexpected argument",
+                unknown);
+        }
     }
     if (!unknown.empty()) message += meant(unknown, known);
     const std::string name = &where == &app ? "stx" : "stx " + where.get_name();

@@ -42,7 +42,7 @@ std::pair<double, double> simplestBetween(double low, double high) {
 }
 
 /// A rate as a fraction: a whole number, that of a film for television (24000/1001), or the
-/// simplest that is no farther off than the share `exact` of it.
+/// simplest; within the share `exact` of the rate.
 std::pair<int, int> rateOf(double rate, double exact) {
     // Of a rate: what 23.976, 29.97 and 59.94 are off, 1e-6, and single precision.
     constexpr double kWritten = 3e-6;

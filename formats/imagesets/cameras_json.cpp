@@ -112,7 +112,7 @@ Result<void> setDepth(const Json& c, const ImageSetOptions& options, const std::
     const bool given = options.depthUnit > 0;
     if (nearPlane && given)
         return failAt(where, ErrorCode::usage,
-                      "its depth is no distance in steps, as 'nearPlane' says; leave out "
+                      "its depth is not in steps of a distance, as 'nearPlane' says; leave out "
                       "--depth-unit");
     if (given) unit = options.depthUnit;
     if (!nearPlane && !unit) {

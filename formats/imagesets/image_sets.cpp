@@ -57,12 +57,10 @@ Result<SetDescription> describeFiles(const path& path, const ImageSetOptions& op
             known += fmt::format("{}{}", known.empty() ? "" : ", ", k.name);
         return fail(ErrorCode::usage, "'{}' is not a kind of image set; known are {}", kind, known);
     }
-    // A folder may be taken for a panorama's because files of its own kind are missing: what it
-    // lacks is the error then.
-    ImageSetOptions checked = options;
-    checked.manyKinds = options.manyKinds || (kind == "panorama" && options.from != kind);
-    STX_CHECK(checkOptionsOf(kind, checked, inQuotes(path.string()), job));
-    return entry->describe(path, options, job);
+    STX_TRY(auto set, entry->describe(path, options, job));
+    // Behind what is wrong with the set: one that lacks files may be taken for another kind.
+    STX_CHECK(checkOptionsOf(kind, options, inQuotes(path.string()), job));
+    return set;
 }
 
 Result<void> checkOptions(const ImageSetOptions& o) {

@@ -115,6 +115,15 @@ Result<SetDescription> describePanorama(const path& given, const ImageSetOptions
                       texture.empty() ? "picture" : "depth image");
     STX_TRY(auto textureSource, sourceInside(given, texture, where, job.limits));
     STX_TRY(auto depthSource, sourceInside(given, depth, where, job.limits));
+    // Any picture with depth beside it is taken for a panorama. One that cannot be opened is an
+    // error where it is read.
+    if (const auto size = imageSizeOf(textureSource, job);
+        size && options.from != "panorama" && !sameShape(*size, {2 * size->y, size->y}) &&
+        !isPair(size->x, size->y))
+        return failAt(where, ErrorCode::invalidInput,
+                      "'{}' is {}x{}; a panorama is twice as wide as it is high (--from panorama "
+                      "reads it as one all the same)",
+                      texture, size->x, size->y);
     return setOf(std::move(textureSource), std::move(depthSource), options);
 }
 

@@ -333,7 +333,7 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
         }
         if (!size) {
             STX_TRY(size, within(where, imageSizeOf(view.texture, job)));
-            // Depth that is damaged is told where it is read.
+            // Damaged depth is an error where it is read.
             const glm::ivec2 depthSize = imageSizeOf(view.depth, job).value_or(*size);
             if (!found.whose.empty()) k = usualIntrinsics(found.whose, k, *size, job);
             if (options.intrinsics[0] != 0) noteOddCentre(k, *size, job);

@@ -3,6 +3,7 @@
 // two cameras of a Kinect.
 
 #include <cmath>
+#include <vector>
 
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
@@ -55,7 +56,13 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
     for (const std::string& stem : stems) {
         const std::string poseName = stem + ".pose.txt";
         const std::string place = inQuotes((given / poseName).string());
-        STX_TRY(const auto n, numbersIn(given / poseName, job.limits, 16, Numbers::any));
+        auto finite = numbersIn(given / poseName, job.limits, 16);
+        std::vector<double> n;
+        if (finite) {
+            n = *finite;
+        } else {
+            STX_TRY(n, numbersIn(given / poseName, job.limits, 16, Numbers::any));
+        }
         if (n.size() != 16)
             return failAt(place, ErrorCode::invalidInput, "{} numbers; 4 rows of 4 are expected",
                           n.size());
@@ -63,10 +70,9 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
         view.name = stem;
         STX_CHECK(
             findPictures(given, stem + ".color.png", stem + ".depth.png", where, job.limits, view));
-        if (!view.missing && !isTracked(n)) {
+        if (!view.missing && !finite) {
             view.lost = true;
-            // The error that names the line.
-            view.missing = numbersIn(given / poseName, job.limits, 16).error();
+            view.missing = finite.error();
             view.missing->message += ", as tracking was lost";
         }
         if (view.missing) {
@@ -75,7 +81,7 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
         }
         if (!size) {
             STX_TRY(size, within(where, imageSizeOf(view.texture, job)));
-            // Depth that is damaged is told where it is read.
+            // Damaged depth is an error where it is read.
             const glm::ivec2 depthSize = imageSizeOf(view.depth, job).value_or(*size);
             // Another colour camera is one of another device, whose depth camera nobody knows.
             const bool own = asked && *asked != scaledTo(*size, kColour);

@@ -269,7 +269,7 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
     STX_TRY(const auto coded, codedDistances(json, where));
     if (coded && options.depthUnit > 0)
         return failAt(where, ErrorCode::usage,
-                      "its depth is no distance in steps, as 'depth_coding' says; leave out "
+                      "its depth is not in steps of a distance, as 'depth_coding' says; leave out "
                       "--depth-unit");
     // Millimetres by convention.
     const Distances distances = coded ? *coded : integersOrFloats(options, unit);

@@ -203,7 +203,7 @@ TEST(LostTracking, LeavesTheFrameOut) {
     writeText(scenes / "frame-000001.pose.txt",
               "-inf -inf -inf -inf\n-inf -inf -inf -inf\n-inf -inf -inf -inf\n0 0 0 1\n");
     expectLost(scenes.path(), {"1 of 3 views", "frame-000001.pose.txt"});
-    // What is no number at all is a file that is broken.
+    // Text that is not a number is damage.
     writeText(scenes / "frame-000001.pose.txt", "x 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
     expectError(readSet(scenes.path()), {"frame-000001.pose.txt", "line 1", "'x'"});
 }

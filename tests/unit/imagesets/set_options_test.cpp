@@ -245,3 +245,17 @@ TEST(Intrinsics, OnesThatCannotBeACamerasAreTold) {
         EXPECT_EQ(readNoted(folder.path(), options).notes.find("outside"), std::string::npos);
     }
 }
+
+// A folder with a picture and its depth is not a panorama's because something is missing there.
+TEST(SetOptions, WhatASetLacksIsSaidBeforeItsOptions) {
+    const TemporaryFolder folder;
+    writeWall(folder, "7scenes");
+    std::filesystem::remove(folder / "frame-000000.pose.txt");
+    ImageSetOptions options = optionsOf("7scenes");
+    options.from.clear();
+    const auto read = readSet(folder.path(), options);
+    ASSERT_FALSE(read);
+    EXPECT_EQ(read.error().code, ErrorCode::invalidInput) << read.error().text();
+    EXPECT_NE(read.error().text().find("24x16; a panorama is twice as wide"), std::string::npos)
+        << read.error().text();
+}
