@@ -278,7 +278,7 @@ Result<SetDescription> describeAzureKinect(const path& given, const ImageSetOpti
         view.camera = device->depth.camera;
         view.lens = device->depth.lens;
         view.sensor = true;
-        view.distances = scaledIntegers(kMillimetre);
+        view.distances = sensorIntegers(kMillimetre);
         view.texture = frameOf(colour, pair.colour);
         view.depth = frameOf(depth, pair.depth);
         view.load = [device](const SetView& self, Job& ownJob) -> Result<StoredView> {

@@ -57,6 +57,7 @@ Result<std::vector<LoggedPose>> parseLog(std::string_view text) {
                 pose.rotation[column][r] = n[static_cast<std::size_t>(column)];
             pose.centre[r] = n[3];
         }
+        pose.lost = pose.lost || pose.rotation == glm::dmat3(0.0);
         poses.push_back(std::move(pose));
     }
     return poses;
@@ -157,7 +158,7 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
         v.width = size->x;
         v.height = size->y;
         view.camera = cameraFromVision(v);
-        view.distances = scaledIntegers(unitOf(options, kMillimetre));
+        view.distances = sensorIntegers(unitOf(options, kMillimetre));
         view.sensor = true;
         set.views.push_back(std::move(view));
     }

@@ -56,7 +56,7 @@ SetDescription setOf(PictureSource texture, PictureSource depth, const ImageSetO
     view.load = [yuv = options.yuv, deep = options.deepColour](const SetView& set, Job& job) {
         return loadPanorama(set, yuv, deep, job);
     };
-    view.distances = integersOrFloats(options, kMillimetre);
+    view.distances = integersOrFloats(options, std::nullopt);
     SetDescription set;
     set.views.push_back(std::move(view));
     return set;

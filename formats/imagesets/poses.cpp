@@ -74,7 +74,7 @@ Result<void> noteLost(std::size_t lost, std::size_t all, const std::string& wher
                       Job& job) {
     if (lost == 0) return {};
     const std::string found =
-        fmt::format("{} of {} {} of lost tracking (nan, inf or a quaternion of 0)", lost,
+        fmt::format("{} of {} {} of lost tracking (nan, inf or a rotation of zeros)", lost,
                     counted(all, "pose"), lost == 1 ? "is" : "are");
     if (strict || lost == all) return failAt(where, ErrorCode::invalidInput, "{}", found);
     job.note(fmt::format("{}: {} and {} left out", where, found, lost == 1 ? "is" : "are"));

@@ -105,9 +105,12 @@ double unitOf(const ImageSetOptions& options, double usual) {
     return options.depthUnit > 0 ? options.depthUnit : usual;
 }
 
-Distances integersOrFloats(const ImageSetOptions& options, double usual) {
-    return [unit = unitOf(options, usual), given = options.depthUnit > 0](
-               Image<float>& values, const Camera& camera, int bits, Job& job) -> Result<void> {
+Distances integersOrFloats(const ImageSetOptions& options, std::optional<double> named) {
+    const bool given = options.depthUnit > 0;
+    const double unit = unitOf(options, named.value_or(kMillimetre));
+    const Distances integers = given || named ? scaledIntegers(unit) : sensorIntegers(unit);
+    return [integers, given](Image<float>& values, const Camera& camera, int bits,
+                             Job& job) -> Result<void> {
         if (bits == 32) {
             if (given) return depthIsFloats("--depth-unit");
             return {};
@@ -115,7 +118,7 @@ Distances integersOrFloats(const ImageSetOptions& options, double usual) {
         if (bits != 16)
             return fail(ErrorCode::invalidInput,
                         "the depth has {} bits; 16 (millimetres) or floats are expected", bits);
-        return scaledIntegers(unit)(values, camera, bits, job);
+        return integers(values, camera, bits, job);
     };
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -22,8 +23,10 @@ inline constexpr std::string_view kFilms = "films", kCalibrated = "middlebury wi
 /// Scene units of one step of integer depth: as --depth-unit says, else `usual`.
 [[nodiscard]] double unitOf(const ImageSetOptions& options, double usual);
 
-/// Of sets that hold integers of 16 bits in steps of unitOf() or floats, which are distances.
+/// Of sets that hold integers of 16 bits or floats, which are distances. The integers are steps of
+/// --depth-unit, else of the unit that the set names, else millimetres of a sensor.
 /// Errors: (invalidInput) 8 bits; (usage) floats, and --depth-unit is given.
-[[nodiscard]] Distances integersOrFloats(const ImageSetOptions& options, double usual);
+[[nodiscard]] Distances integersOrFloats(const ImageSetOptions& options,
+                                         std::optional<double> named);
 
 }  // namespace stx::imagesets

@@ -143,6 +143,12 @@ void dropImpossible(Image<float>& distances);
 /// Distances of integers in steps of `unit`; 0 and `alsoNone` are not known.
 [[nodiscard]] Distances scaledIntegers(double unit, float alsoNone = 0);
 
+/// The same of sensors, of 16 bits: their largest code, 65535, is not known either. It is what they
+/// write for "too far" or "no answer"; in millimetres it would be a wall at 65.5 m.
+[[nodiscard]] inline Distances sensorIntegers(double unit) {
+    return scaledIntegers(unit, 65535);
+}
+
 /// Distances of normalised disparity: s = code / (2^bits - 1), 1 at `nearest` and 0 at `farthest`
 /// (scene units; infinity: 1 / distance from 0). 0 is not known where `zeroIsNone`. Floats are
 /// distances already.

@@ -73,8 +73,12 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
         if (!view.missing && !finite) {
             view.lost = true;
             view.missing = finite.error();
-            view.missing->message += ", as tracking was lost";
+        } else if (!view.missing && rotationOfRows(n) == glm::dmat3(0.0)) {
+            view.lost = true;
+            view.missing =
+                failAt(place, ErrorCode::invalidInput, "the rotation is of zeros").value();
         }
+        if (view.lost) view.missing->message += ", as tracking was lost";
         if (view.missing) {
             set.views.push_back(std::move(view));
             continue;
@@ -122,7 +126,7 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
             view.depthCamera = cameraBeside(v, *depth);
         }
         view.camera = cameraFromVision(v);
-        view.distances = scaledIntegers(unitOf(options, kMillimetre), 65535);
+        view.distances = sensorIntegers(unitOf(options, kMillimetre));
         view.sensor = true;
         set.views.push_back(std::move(view));
     }

@@ -262,17 +262,15 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
     if (!scale) {
         STX_TRY(scale, within(where, findNumber(json, "depth_unit_scale_factor", "")));
     }
-    const double unit = scale.value_or(kMillimetre);
-    if (!(unit > 0))
+    if (scale && !(*scale > 0))
         return failAt(where, ErrorCode::invalidInput,
-                      "the depth's scale is {:g}; it must be above 0", unit);
+                      "the depth's scale is {:g}; it must be above 0", *scale);
     STX_TRY(const auto coded, codedDistances(json, where));
     if (coded && options.depthUnit > 0)
         return failAt(where, ErrorCode::usage,
                       "its depth is not in steps of a distance, as 'depth_coding' says; leave out "
                       "--depth-unit");
-    // Millimetres by convention.
-    const Distances distances = coded ? *coded : integersOrFloats(options, unit);
+    const Distances distances = coded ? *coded : integersOrFloats(options, scale);
     const Json& frames = json["frames"];
     const auto describe = [&](std::size_t i) -> Result<void> {
         SetView& view = set.views[i];

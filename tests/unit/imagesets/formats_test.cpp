@@ -213,15 +213,17 @@ TEST(Middlebury, PfmDisparityComesBackExactly) {
 }
 
 TEST(Rgbd, TumRecordingsAreAssociatedByTime) {
-    const auto views = roomViews();
+    auto views = roomViews();
+    for (ReferenceView& view : views) view.depth.at(5, 4) = kNoDepth;
     TemporaryFolder folder;
     std::string rgb = "# colour\n", depth, poses = "# t tx ty tz qx qy qz qw\n";
     for (std::size_t i = 0; i < 2; ++i) {
         const auto& v = views[i];
         const glm::dquat q = glm::quat_cast(visionRotation(v.camera));
         writeColour(folder / fmt::format("rgb/{}.png", i), v);
-        writeCodes(folder / fmt::format("depth/{}.png", i), 96, 64, 16,
-                   [&](int x, int y) { return std::lround(v.depth.at(x, y) * 5000); });
+        writeCodes(folder / fmt::format("depth/{}.png", i), 96, 64, 16, [&](int x, int y) {
+            return x == 5 && y == 4 ? 65535L : std::lround(v.depth.at(x, y) * 5000);
+        });
         rgb += fmt::format("{} rgb/{}.png\n", 10.0 + i, i);
         depth += fmt::format("{} depth/{}.png\n", 10.01 + i, i);
         for (const double dt : {-0.005, 0.005})
@@ -285,7 +287,7 @@ TEST(Open3d, NumbersInNamesSortAsNumbers) {
     for (int i = 0; i < 12; ++i) {
         writeColour(folder / fmt::format("color/{}.png", i), views[0]);
         writeCodes(folder / fmt::format("depth/{}.png", i), 96, 64, 16,
-                   [i](int, int) { return 1000 + i; });
+                   [i](int x, int y) { return x == 5 && y == 4 ? 65535 : 1000 + i; });
         if (i == 4) continue;
         log += fmt::format("{} {} {}\n1 0 0 {}\n0 1 0 0\n0 0 1 0\n0 0 0 1\n", i, i, i + 1, i);
     }
@@ -301,6 +303,7 @@ TEST(Open3d, NumbersInNamesSortAsNumbers) {
     for (const ReferenceView& view : read->views) {
         EXPECT_EQ(view.name, fmt::format("{:g}", view.camera.position.x));
         EXPECT_NEAR(view.depth.at(9, 9), 1 + 0.001 * view.camera.position.x, 1e-5);
+        EXPECT_FALSE(hasPoint(view.depth.at(5, 4)));
     }
     const auto notes = job.takeNotes();
     EXPECT_TRUE(std::ranges::any_of(notes, [](const std::string& note) {
@@ -363,6 +366,32 @@ TEST(Transforms, MillimetresAndNamesWithoutAnEnding) {
     const auto read = readSet(folder.path());
     ASSERT_TRUE(read) << read.error().text();
     expectSame(views[0], read->views[0], [](double) { return 0.0005; });
+}
+
+/// 65535 is a sensor's "too far", or the end of a writer's codes; of steps that the file or the
+/// user names it is a distance.
+TEST(Transforms, TheLargestCodeIsADistanceOnlyOfStepsThatAreNamed) {
+    auto views = roomViews(1);
+    TemporaryFolder folder;
+    views[0].depth.at(5, 4) = 65.535f;
+    writeMillimetres(folder, views[0]);
+    writeText(folder / "transforms.json", transformsJson(views[0].camera, ""));
+    ImageSetOptions options = keepAll();
+    options.depthBits = 32;
+    const auto usual = readSet(folder.path(), options);
+    ASSERT_TRUE(usual) << usual.error().text();
+    EXPECT_FALSE(hasPoint(usual->views[0].depth.at(5, 4)));
+    EXPECT_TRUE(hasPoint(usual->views[0].depth.at(6, 4)));
+    options.depthUnit = 0.001;
+    const auto asked = readSet(folder.path(), options);
+    ASSERT_TRUE(asked) << asked.error().text();
+    EXPECT_NEAR(asked->views[0].depth.at(5, 4), 65.535, 1e-4);
+    options.depthUnit = 0;
+    writeText(folder / "transforms.json",
+              transformsJson(views[0].camera, "\"integer_depth_scale\":0.001,"));
+    const auto named = readSet(folder.path(), options);
+    ASSERT_TRUE(named) << named.error().text();
+    EXPECT_NEAR(named->views[0].depth.at(5, 4), 65.535, 1e-4);
 }
 
 // The principal point, 3.25 and -1.75 pixels from the middle, tells the size but for that.

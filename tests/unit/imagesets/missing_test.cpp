@@ -203,6 +203,8 @@ TEST(LostTracking, LeavesTheFrameOut) {
     writeText(scenes / "frame-000001.pose.txt",
               "-inf -inf -inf -inf\n-inf -inf -inf -inf\n-inf -inf -inf -inf\n0 0 0 1\n");
     expectLost(scenes.path(), {"1 of 3 views", "frame-000001.pose.txt"});
+    writeText(scenes / "frame-000001.pose.txt", "0 0 0 0\n0 0 0 0\n0 0 0 0\n0 0 0 0\n");
+    expectLost(scenes.path(), {"1 of 3 views", "frame-000001.pose.txt", "zeros"});
     // Text that is not a number is damage.
     writeText(scenes / "frame-000001.pose.txt", "x 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
     expectError(readSet(scenes.path()), {"frame-000001.pose.txt", "line 1", "'x'"});
@@ -215,10 +217,12 @@ TEST(LostTracking, OfOpen3dLeavesTheFrameOut) {
         writeColour(folder / "color" / name, views[0]);
         writeCodes(folder / "depth" / name, 96, 64, 16, [](int, int) { return 2000; });
     }
-    writeText(folder / "trajectory.log",
-              "0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
-              "1 1 2\nnan nan nan nan\nnan nan nan nan\nnan nan nan nan\n0 0 0 1\n");
-    expectLost(folder.path(), {"1 of 2 pictures", "trajectory.log"}, 1);
+    for (const char* lost : {"nan nan nan nan\nnan nan nan nan\nnan nan nan nan\n0 0 0 1\n",
+                             "0 0 0 0\n0 0 0 0\n0 0 0 0\n0 0 0 0\n"}) {
+        writeText(folder / "trajectory.log",
+                  std::string("0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n1 1 2\n") + lost);
+        expectLost(folder.path(), {"1 of 2 pictures", "trajectory.log"}, 1);
+    }
 }
 
 TEST(LostTracking, OfPosesByNumberLeavesTheirFrameOut) {
