@@ -21,11 +21,11 @@ Rgba8Image pictureAt(const std::filesystem::path& path) {
     return std::move(*picture);
 }
 
-struct Figures {
+struct StillFigures {
     double age = 0, peps = 0;
 };
 
-Figures figuresOf(const std::filesystem::path& sequence, const StillSettings& settings) {
+StillFigures figuresOf(const std::filesystem::path& sequence, const StillSettings& settings) {
     Job job;
     const auto frames = openVideoFrames({sequence / "input"}, job);
     EXPECT_TRUE(frames) << frames.error().text();
@@ -33,7 +33,7 @@ Figures figuresOf(const std::filesystem::path& sequence, const StillSettings& se
     EXPECT_TRUE(made) << made.error().text();
     const auto truth = pictureAt(sequence / "derived_background.png");
     const auto known = pictureAt(sequence / "derived_known.png");
-    Figures f;
+    StillFigures f;
     double count = 0;
     for (std::size_t i = 0; i < truth.count(); ++i) {
         if (known.pixels()[i].r < 128) continue;

@@ -17,6 +17,7 @@
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/factory.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
+#include "tests/golden/tolerance.hpp"
 #include "tests/naive_warp.hpp"
 #include "tests/noisy_depth.hpp"
 #include "tests/shared_data.hpp"
@@ -24,9 +25,6 @@
 
 namespace stx {
 namespace {
-
-// Within this of the figures once reached, dB.
-constexpr double kTolerance = 0.2;
 
 RenderSettings settingsOf(Quality quality) {
     RenderSettings s;

@@ -11,13 +11,12 @@
 #include "lib/geometry/view_layout.hpp"
 #include "lib/render/factory.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
+#include "tests/golden/tolerance.hpp"
 #include "tests/shared_data.hpp"
 
 namespace stx {
 namespace {
 
-// Within this of the figures once reached, dB.
-constexpr double kTolerance = 0.2;
 constexpr double kDegree = std::numbers::pi / 180;
 
 Mesh meshAt(const std::filesystem::path& path) {

@@ -4,14 +4,12 @@
 
 #include "lib/metrics/compare.hpp"
 #include "lib/render/splat/cpu/cpu_splat.hpp"
+#include "tests/golden/tolerance.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/spheres_miv.hpp"
 
 namespace stx {
 namespace {
-
-// Within this of the figures once reached; full-range Y, dB.
-constexpr double kTolerance = 0.2;
 
 Image<glm::u8vec4> eightBit(const Frame& f) {
     Image<glm::u8vec4> out(f.colour.width(), f.colour.height());

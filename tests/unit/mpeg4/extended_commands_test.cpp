@@ -62,12 +62,20 @@ TEST(ExtendedCommands, InTheFirstAccessUnitAreAnError) {
 }
 
 /// The numbers of the extended commands.
-enum Kind { insertProto, deleteProto, deleteAllProtos, manyItems, manyFields, globalQp, xDelete };
+enum CommandKind {
+    insertProto,
+    deleteProto,
+    deleteAllProtos,
+    manyItems,
+    manyFields,
+    globalQp,
+    xDelete
+};
 
 /// An access unit of one extended command and what `more` writes, for the scene of a document.
 class ExtendedUnit {
   public:
-    ExtendedUnit(const Document& document, Kind kind)
+    ExtendedUnit(const Document& document, CommandKind kind)
         : document_(document), ids_(assignNodeIds(document.frames)) {
         out.write(1, 4);  // insert, extended
         out.write(kind, 8);
@@ -330,7 +338,7 @@ TEST(ExtendedCommands, InTheSceneItselfLeaveTheScene) {
 }
 
 TEST(ExtendedCommands, OfProtosThatAreDeletedChangeNothing) {
-    for (const Kind kind : {deleteProto, deleteAllProtos}) {
+    for (const CommandKind kind : {deleteProto, deleteAllProtos}) {
         ExtendedUnit unit(fitted("PROTO P [ ] { Group { } } DEF G Group { children [ P { } ] }"),
                           kind);
         if (kind == deleteProto) {

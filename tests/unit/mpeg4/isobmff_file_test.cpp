@@ -75,7 +75,7 @@ Bytes written(const Document& document) {
     return bytes ? *bytes : Bytes();
 }
 
-std::string errorOf(const Bytes& bytes) {
+std::string errorOfFile(const Bytes& bytes) {
     Job job;
     const auto document = readMp4(ByteSource::fromBytes(bytes), job);
     return document ? "read" : document.error().text();
@@ -324,12 +324,12 @@ TEST(IsobmffFile, SixtyFourBitSizesAndOffsetsAreRead) {
 
 TEST(IsobmffFile, DamageIsToldWithItsPlace) {
     const Bytes good = written(sample());
-    EXPECT_EQ(errorOf(good), "read");
+    EXPECT_EQ(errorOfFile(good), "read");
     const auto with = [&](std::string_view type, std::ptrdiff_t from, std::uint32_t value) {
         Bytes bad = good;
         put32(bad, static_cast<std::size_t>(static_cast<std::ptrdiff_t>(find(bad, type)) + from),
               value);
-        return errorOf(bad);
+        return errorOfFile(bad);
     };
     EXPECT_NE(with("moov", -4, 0x7FFFFFFF).find("'moov' claims 2147483647 bytes"),
               std::string::npos);
@@ -342,12 +342,14 @@ TEST(IsobmffFile, DamageIsToldWithItsPlace) {
     EXPECT_NE(with("mdhd", 16, 0).find("timescale is 0"), std::string::npos);
     EXPECT_NE(with("stsc", 12, 2).find("stsc"), std::string::npos);
     // A sample description of a scene with a code that no version has.
-    EXPECT_NE(errorOf(Bytes(good.begin(), good.begin() + 100)).find("byte 28"), std::string::npos);
-    EXPECT_NE(errorOf({}).find("no 'moov'"), std::string::npos);
-    EXPECT_NE(errorOf(unhex("ffd8ffe000104a46494600")).find("not an MP4 file"), std::string::npos);
+    EXPECT_NE(errorOfFile(Bytes(good.begin(), good.begin() + 100)).find("byte 28"),
+              std::string::npos);
+    EXPECT_NE(errorOfFile({}).find("no 'moov'"), std::string::npos);
+    EXPECT_NE(errorOfFile(unhex("ffd8ffe000104a46494600")).find("not an MP4 file"),
+              std::string::npos);
     Bytes cut = good;
     cut.resize(good.size() - 1);
-    EXPECT_NE(errorOf(cut).find("'mdat' claims"), std::string::npos) << errorOf(cut);
+    EXPECT_NE(errorOfFile(cut).find("'mdat' claims"), std::string::npos) << errorOfFile(cut);
 }
 
 TEST(IsobmffFile, FragmentedAndEncryptedFilesAreRefusedByName) {
@@ -355,7 +357,7 @@ TEST(IsobmffFile, FragmentedAndEncryptedFilesAreRefusedByName) {
     const auto renamed = [&](std::string_view from, std::string_view to) {
         Bytes bad = good;
         std::memcpy(bad.data() + find(bad, from), to.data(), 4);
-        return errorOf(bad);
+        return errorOfFile(bad);
     };
     // 'iods' holds nothing that is missed before mvex is.
     EXPECT_NE(renamed("iods", "mvex").find("fragmented"), std::string::npos)
@@ -373,9 +375,9 @@ TEST(IsobmffFile, UnknownBoxesArePassedOver) {
     strange.text("xyz?");
     strange.u32(42);
     bytes.insert(bytes.end(), strange.view().begin(), strange.view().end());
-    EXPECT_EQ(errorOf(bytes), "read");
+    EXPECT_EQ(errorOfFile(bytes), "read");
     std::memcpy(bytes.data() + find(bytes, "mvhd"), "xyz?", 4);
-    EXPECT_EQ(errorOf(bytes), "read");
+    EXPECT_EQ(errorOfFile(bytes), "read");
 }
 
 TEST(IsobmffFile, WhatHasNoCodeIsRefused) {

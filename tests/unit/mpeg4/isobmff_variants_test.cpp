@@ -9,45 +9,45 @@
 namespace stx::mpeg4 {
 namespace {
 
-using Kind = Mp4Deviation::Kind;
+using Deviation = Mp4Deviation::Kind;
 
 struct Variant {
     const char* file;
     const char* theirs;  ///< the other implementation's verdict, for people
     int images;          ///< object descriptors whose image bytes we reach
-    std::vector<Kind> deviations;
+    std::vector<Deviation> deviations;
 };
 
 const std::vector<Variant>& variants() {
     static const std::vector<Variant> all = {
         {"a_base_mask_vec", "read", 2, {}},
-        {"b2_list_list_pad1", "read", 2, {Kind::trailingBytes}},
+        {"b2_list_list_pad1", "read", 2, {Deviation::trailingBytes}},
         {"b3_mask_list", "read", 2, {}},
         {"b4_list_vec", "read", 2, {}},
         {"b_list_list", "read", 2, {}},
         {"c_oti2_v2cfg", "read", 2, {}},
-        {"d_no_iods", "nothing found", 2, {Kind::noIods}},
+        {"d_no_iods", "nothing found", 2, {Deviation::noIods}},
         {"e_mdat_first", "read", 2, {}},
-        {"f_img_mp4s", "load fails", 2, {Kind::imageInSystemsEntry}},
-        {"g_img_native", "scene without images", 2, {Kind::imageInNativeEntry}},
-        {"h_od_full_esd_noref", "error, no images", 2, {Kind::fullEsdInOd}},
-        {"i2_od_tag01_ref", "read", 2, {Kind::streamOdTag}},
-        {"i_od_tag01_fullesd", "images lost", 2, {Kind::streamOdTag, Kind::fullEsdInOd}},
-        {"j_no_mpod", "images not resolved", 0, {Kind::mpodMissing}},
-        {"k_pad4", "read", 2, {Kind::trailingBytes}},
-        {"l_esid_nonzero", "read", 2, {Kind::esIdNotZero}},
+        {"f_img_mp4s", "load fails", 2, {Deviation::imageInSystemsEntry}},
+        {"g_img_native", "scene without images", 2, {Deviation::imageInNativeEntry}},
+        {"h_od_full_esd_noref", "error, no images", 2, {Deviation::fullEsdInOd}},
+        {"i2_od_tag01_ref", "read", 2, {Deviation::streamOdTag}},
+        {"i_od_tag01_fullesd", "images lost", 2, {Deviation::streamOdTag, Deviation::fullEsdInOd}},
+        {"j_no_mpod", "images not resolved", 0, {Deviation::mpodMissing}},
+        {"k_pad4", "read", 2, {Deviation::trailingBytes}},
+        {"l_esid_nonzero", "read", 2, {Deviation::esIdNotZero}},
         {"m_no_jpeg_dsi", "read", 2, {}},
         {"n_stts0", "read", 2, {}},
         {"o_nosize", "read", 2, {}},
         {"p_pixelmetric", "read", 2, {}},
         {"q_nodebits10", "read", 2, {}},
-        {"r_no_od_track", "scene without images", 0, {Kind::noOdTrack}},
+        {"r_no_od_track", "scene without images", 0, {Deviation::noOdTrack}},
         {"s_handler_pict", "read", 2, {}},
         {"t_brand_isom", "read", 2, {}},
         {"u_long_desc_len", "read", 2, {}},
-        {"v_bifs_only", "read", 0, {Kind::noOdTrack}},
-        {"w_pixeltexture", "read", 0, {Kind::noOdTrack}},
-        {"x_od01_fullesd_nompod", "read", 2, {Kind::streamOdTag, Kind::fullEsdInOd}},
+        {"v_bifs_only", "read", 0, {Deviation::noOdTrack}},
+        {"w_pixeltexture", "read", 0, {Deviation::noOdTrack}},
+        {"x_od01_fullesd_nompod", "read", 2, {Deviation::streamOdTag, Deviation::fullEsdInOd}},
     };
     return all;
 }
@@ -73,7 +73,7 @@ TEST(IsobmffVariants, EachIsReadAndItsDeviationsAreReported) {
             readMp4(openSource(folder / (std::string(variant.file) + ".mp4")), job);
         ASSERT_TRUE(document) << document.error().text();
         EXPECT_EQ(imagesOf(*document), variant.images);
-        std::vector<Kind> kinds;
+        std::vector<Deviation> kinds;
         for (const Mp4Deviation& deviation : document->mp4->deviations) {
             if (std::find(kinds.begin(), kinds.end(), deviation.kind) == kinds.end())
                 kinds.push_back(deviation.kind);
@@ -81,7 +81,7 @@ TEST(IsobmffVariants, EachIsReadAndItsDeviationsAreReported) {
             EXPECT_FALSE(deviation.where.empty()) << deviation.text;
         }
         std::sort(kinds.begin(), kinds.end());
-        std::vector<Kind> expected = variant.deviations;
+        std::vector<Deviation> expected = variant.deviations;
         std::sort(expected.begin(), expected.end());
         EXPECT_EQ(kinds, expected);
         // All but the last two hold one and the same scene.

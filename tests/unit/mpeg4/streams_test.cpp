@@ -56,7 +56,7 @@ void expectSameStreams(const Document& a, const Document& b) {
 }
 
 /// Writes a document in each form, reads it and compares the streams.
-void expectKeptEverywhere(const Document& document) {
+void expectStreamsKept(const Document& document) {
     const TemporaryFolder folder("streams");
     Job job;
     for (const char* name : {"a.mp4", "a.bt", "a.xmt"}) {
@@ -82,7 +82,7 @@ TEST_P(MotionFile, IsTheSameInEveryForm) {
     ASSERT_TRUE(document) << document.error().text();
     ASSERT_EQ(streamsOf(*document).size(), 2u);
     EXPECT_GT(streamsOf(*document)[0].samples.size(), 1u);
-    expectKeptEverywhere(*document);
+    expectStreamsKept(*document);
 }
 INSTANTIATE_TEST_SUITE_P(All, MotionFile,
                          testing::Values("avc.mp4", "hevc.mp4", "m4v.mp4", "imgseq.mp4"));
@@ -125,7 +125,7 @@ TEST(Streams, AnEntryThatNobodyKnowsPassesThrough) {
     EXPECT_EQ(hex(streams[2].sampleEntry), hex(stream.sampleEntry));
     EXPECT_EQ(streams[2].handler, "meta");
     EXPECT_FALSE(streams[2].samples[1].sync);
-    expectKeptEverywhere(read);
+    expectStreamsKept(read);
 }
 
 TEST(Streams, AStartIsADelayInTheFileAndAStartTimeInTexts) {
@@ -136,7 +136,7 @@ TEST(Streams, AStartIsADelayInTheFileAndAStartTimeInTexts) {
         EXPECT_EQ(streamsOf(read).at(0).samples.at(0).time, start);
         EXPECT_TRUE(streamsOf(read).at(0).edits.edits.empty());
         EXPECT_EQ(streamsOf(read).at(1).samples.at(0).time, 0u);
-        expectKeptEverywhere(read);
+        expectStreamsKept(read);
         // An .mp4 has it as an empty edit.
         Job job;
         const auto bytes = writeMp4(document, job);
@@ -152,7 +152,7 @@ TEST(Streams, ASceneThatBeginsLateKeepsItsTime) {
     const Document read = throughMp4(document);
     EXPECT_EQ(read.frames.at(0).time, 500u);
     EXPECT_EQ(read.odFrames.at(0).time, 250u);
-    expectKeptEverywhere(read);
+    expectStreamsKept(read);
     EXPECT_EQ(bundleOf(read).views.size(), 1u);
 }
 
@@ -167,7 +167,7 @@ TEST(Streams, EditsThatAreNoDelayAreKept) {
     EXPECT_EQ(edits.edits[0].mediaTime, -1);
     EXPECT_EQ(edits.edits[1].mediaTime, 100);
     EXPECT_EQ(edits.edits[2].rate, 0x8000u);
-    expectKeptEverywhere(read);
+    expectStreamsKept(read);
 }
 
 TEST(Streams, OnlyPlacesToBeginAreSyncSamples) {
@@ -190,7 +190,7 @@ TEST(Streams, OnlyPlacesToBeginAreSyncSamples) {
         EXPECT_EQ(read.frames[i].randomAccess, i == 2);
         EXPECT_EQ(read.odFrames[i].randomAccess, i == 3);
     }
-    expectKeptEverywhere(read);
+    expectStreamsKept(read);
 }
 
 }  // namespace

@@ -51,7 +51,7 @@ NodePtr rootOf(const Document& document) {
     const auto* scene = std::get_if<ReplaceScene>(&document.frames[0].commands[0]);
     return scene ? scene->root : nullptr;
 }
-NodePtr child(const NodePtr& node, std::size_t i) {
+NodePtr childOf(const NodePtr& node, std::size_t i) {
     const auto& list = node->get<NodeList>("children");
     return i < list.size() ? list[i] : nullptr;
 }
@@ -172,16 +172,16 @@ Group { children [   # another { [ "
     const NodePtr root = rootOf(d);
     ASSERT_TRUE(root);
     ASSERT_EQ(root->get<NodeList>("children").size(), 6u);
-    const NodePtr a = child(root, 0);
+    const NodePtr a = childOf(root, 0);
     EXPECT_EQ(a->get<glm::vec3>("position"), glm::vec3(1, 2, -3));
     EXPECT_FALSE(a->get<bool>("orthographic"));
     EXPECT_EQ(a->get<float>("nearPlane"), 2.0f);
     EXPECT_EQ(a->defName, "A");
-    const NodePtr b = child(root, 2);
-    EXPECT_EQ(child(child(root, 1), 0), b) << "USE before its DEF";
-    EXPECT_EQ(child(b, 0), a);
+    const NodePtr b = childOf(root, 2);
+    EXPECT_EQ(childOf(childOf(root, 1), 0), b) << "USE before its DEF";
+    EXPECT_EQ(childOf(b, 0), a);
     EXPECT_EQ(b->get<NodeList>("children").size(), 1u) << "NULL is not an item of a list";
-    const auto urls = child(root, 4)
+    const auto urls = childOf(root, 4)
                           ->get<NodePtr>("appearance")
                           ->get<NodePtr>("texture")
                           ->get<std::vector<Url>>("url");
@@ -339,7 +339,7 @@ TEST(Xmt, ReferencesThatStandForNothingAreErrors) {
     // A & that begins no reference is one.
     const Document d = mustReadXmt(titled("&amp;&lt;&#65;&#x42; R&D & co"));
     ASSERT_TRUE(rootOf(d));
-    EXPECT_EQ(child(rootOf(d), 0)->get<std::string>("title"), "&<AB R&D & co");
+    EXPECT_EQ(childOf(rootOf(d), 0)->get<std::string>("title"), "&<AB R&D & co");
 }
 
 TEST(Xmt, AnAttributeThatIsThereTwiceIsAnError) {
@@ -380,7 +380,7 @@ TEST(Xmt, StringIdsOfDescriptorsWin) {
         "<ObjectDescriptorUpdate><OD><ObjectDescriptor objectDescriptorID=\"tex\" binaryID=\"33\"/>"
         "<ObjectDescriptor objectDescriptorID=\"od9\" binaryID=\"34\"/>"
         "</OD></ObjectDescriptorUpdate></Body></XMT-A>");
-    const auto urls = child(rootOf(d), 0)
+    const auto urls = childOf(rootOf(d), 0)
                           ->get<NodePtr>("appearance")
                           ->get<NodePtr>("texture")
                           ->get<std::vector<Url>>("url");
@@ -433,7 +433,7 @@ TEST(Text, CharactersThatXmlCannotHoldAreReplacedAndSaid) {
     const auto text = writeXmt(d, job);
     ASSERT_TRUE(text);
     EXPECT_EQ(job.takeNotes().size(), 1u);
-    EXPECT_EQ(child(rootOf(mustReadXmt(*text)), 1)->get<std::string>("title"),
+    EXPECT_EQ(childOf(rootOf(mustReadXmt(*text)), 1)->get<std::string>("title"),
               "a\xEF\xBF\xBD\xEF\xBF\xBDz");
 }
 
