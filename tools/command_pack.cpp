@@ -371,6 +371,7 @@ Result<int> packInput(const PackOptions& options, Program& program) {
     STX_CHECK(setSize(o.size, program.job.limits, o.settings));
     STX_CHECK(checkTime(o.time));
     STX_CHECK(checkTarget(o.output, program));
+    o.settings.bytesToWrite = bytesToWriteAtlas(o.output);
     if (!o.budget.empty()) STX_SET(o.pruning.budget, parsePixels(o.budget));
     STX_TRY(o.inputs, expandInputs(options.inputs, program.job.limits));
     if (o.inputs.size() > 1 || !o.names.empty()) return packSheet(o, program);

@@ -7,9 +7,9 @@
 #include "formats/atlas/atlas_json.hpp"
 #include "formats/atlas/atlas_textures.hpp"
 #include "formats/exr/environment_exr.hpp"
-#include "formats/exr/exr_colour.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/parallel_try.hpp"
+#include "lib/model/peak_memory.hpp"
 
 namespace stx {
 
@@ -183,16 +183,11 @@ Result<void> writeFolder(const Atlas& atlas, const fs::path& path, Job& job,
 Result<void> writeExr(const Atlas& atlas, const fs::path& path, Job& job,
                       OutputFile::Options options) {
     const AtlasHeader header = headerOf(atlas, true);
-    const auto pixelsOf = [&](int page, const Image<glm::vec4>& colour) {
-        std::vector<ExrConstPixels> pixels;
-        for (const auto& t : header.textures) {
-            if (t.page == page) addAttribute(atlas.pages[page], t.attribute, colour, pixels);
-        }
-        return pixels;
-    };
+    std::vector<std::vector<std::string>> attributes(header.pages);
+    for (const auto& t : header.textures) attributes[t.page].push_back(t.attribute);
     std::vector<ExrPart> parts;
     for (int i = 0; i < header.pages; ++i) {
-        parts.push_back(exrPartOf(header, pixelsOf(i, Image<glm::vec4>(1, 1))));
+        parts.push_back(exrPartOf(header, attributes[i]));
         parts.back().name = fmt::format("page {}", i);
     }
     parts[0].attributes["stx:version"] = std::int64_t{1};
@@ -208,8 +203,7 @@ Result<void> writeExr(const Atlas& atlas, const fs::path& path, Job& job,
     STX_TRY(auto writer, ExrWriter::create(file, parts));
     for (int i = 0; i < header.pages; ++i) {
         STX_CHECK(job.checkCancelled());
-        const auto colour = premultipliedLinear(atlas.pages[i].texture);
-        STX_CHECK(writer.writePart(i, pixelsOf(i, colour)));
+        STX_CHECK(writePage(writer, i, atlas.pages[i], attributes[i]));
     }
     if (environment) STX_CHECK(writeEnvironmentPart(writer, header.pages, *environment));
     STX_CHECK(writer.finish());
@@ -449,6 +443,10 @@ Result<void> writeAtlas(Atlas&& atlas, const fs::path& path, Job& job,
                         const AtlasSaveOptions& options) {
     Atlas own = std::move(atlas);
     return writeAny(own, path, job, options, [&own](int page) { own.pages[page].depth = {}; });
+}
+
+std::optional<std::uint64_t> bytesToWriteAtlas(const fs::path& path) {
+    return isExrName(path) ? std::optional(peak::kAtlasInExr.perPixel) : std::nullopt;
 }
 
 int largestImageSide(const Atlas& atlas, const fs::path& path, const AtlasSaveOptions& options) {

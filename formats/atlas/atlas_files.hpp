@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -81,6 +82,9 @@ struct AtlasSaveOptions {
 /// The same bytes; depth takes no memory any more once it is coded.
 [[nodiscard]] Result<void> writeAtlas(Atlas&& atlas, const std::filesystem::path& path, Job& job,
                                       const AtlasSaveOptions& options = {});
+
+/// For PackSettings::bytesToWrite: what writeAtlas() takes beside the pages.
+[[nodiscard]] std::optional<std::uint64_t> bytesToWriteAtlas(const std::filesystem::path& path);
 
 /// Longest side of the images that writeAtlas() makes of an atlas that passes check(), pixels:
 /// where an image holds two pictures of a page (AtlasTexture::secondX), it is larger than the page.

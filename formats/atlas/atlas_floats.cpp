@@ -29,40 +29,51 @@ void forImages(Page& page, const std::string& attribute, Colour& colour, const A
         add(page.emissive, Names{"emissive.R", "emissive.G", "emissive.B"});
 }
 
+/// Channels of an image from row `y` on.
 template <class Pixels, class Picture>
-void addChannels(std::vector<Pixels>& pixels, Picture& image, Names names) {
-    auto* values = reinterpret_cast<decltype(Pixels::values)>(image.data());
+void addChannels(std::vector<Pixels>& pixels, Picture& image, int y, Names names) {
+    auto* values = reinterpret_cast<decltype(Pixels::values)>(image.row(y).data());
     for (const char* name : names) pixels.push_back({name, values++, names.size()});
 }
 
 }  // namespace
 
-void addAttribute(const AtlasPage& page, const std::string& attribute,
-                  const Image<glm::vec4>& colour, std::vector<ExrConstPixels>& pixels) {
-    forImages(page, attribute, colour,
-              [&](const auto& image, Names names) { addChannels(pixels, image, names); });
-}
-
-ExrPart exrPartOf(const AtlasHeader& header, const std::vector<ExrConstPixels>& pixels) {
+ExrPart exrPartOf(const AtlasHeader& header, const std::vector<std::string>& attributes) {
     ExrPart part;
     part.width = part.displayWidth = header.pageWidth;
     part.height = part.displayHeight = header.pageHeight;
-    for (const auto& p : pixels) {
-        const bool colour = p.channel.size() == 1 && p.channel != "Z";
-        part.channels.push_back({p.channel, colour && !header.linear ? Type::half : Type::float32});
+    const AtlasPage none;
+    for (const std::string& attribute : attributes) {
+        const bool half = attribute == "colour" && !header.linear;
+        forImages(none, attribute, none.texture, [&](const auto&, Names names) {
+            for (const char* name : names)
+                part.channels.push_back({name, half ? Type::half : Type::float32});
+        });
     }
     return part;
 }
 
+Result<void> writePage(ExrWriter& writer, int part, const AtlasPage& page,
+                       const std::vector<std::string>& attributes) {
+    Image<glm::vec4> colour;
+    return writer.writePart(part, [&](int y, int rows) {
+        std::vector<ExrConstPixels> pixels;
+        for (const std::string& attribute : attributes) {
+            const bool made = attribute == "colour";
+            if (made) colour = premultipliedLinear(page.texture, y, rows);
+            forImages(page, attribute, colour, [&](const auto& image, Names names) {
+                addChannels(pixels, image, made ? 0 : y, names);
+            });
+        }
+        return pixels;
+    });
+}
+
 Result<void> writeFloatImage(const AtlasHeader& header, const AtlasPage& page,
                              const AtlasTexture& t, const std::filesystem::path& path) {
-    Image<glm::vec4> colour;
-    if (t.attribute == "colour") colour = premultipliedLinear(page.texture);
-    std::vector<ExrConstPixels> pixels;
-    addAttribute(page, t.attribute, colour, pixels);
     STX_TRY(auto file, OutputFile::create(path));
-    STX_TRY(auto writer, ExrWriter::create(file, {exrPartOf(header, pixels)}));
-    STX_CHECK(writer.writePart(0, pixels));
+    STX_TRY(auto writer, ExrWriter::create(file, {exrPartOf(header, {t.attribute})}));
+    STX_CHECK(writePage(writer, 0, page, {t.attribute}));
     STX_CHECK(writer.finish());
     return file.commit();
 }
@@ -82,7 +93,7 @@ Result<void> readFloats(const ExrReader& reader, int part,
                 return;
             }
             image = std::remove_reference_t<decltype(image)>(header.width, header.height);
-            addChannels(pixels, image, names);
+            addChannels(pixels, image, 0, names);
         });
     for (const auto& name : wanted) {
         if (!header.channel(name))

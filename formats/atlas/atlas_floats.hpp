@@ -11,15 +11,15 @@ namespace stx {
 
 /// Pixels of an atlas' textures as the channels that OpenEXR files hold, and back.
 
-/// Adds the channels of one attribute of a page, which must have it. `colour` is the page's,
-/// premultiplied and linear, and is needed for "colour" only. What is added points into both.
-void addAttribute(const AtlasPage& page, const std::string& attribute,
-                  const Image<glm::vec4>& colour, std::vector<ExrConstPixels>& pixels);
-
-/// The header of a part with these channels, as large as a page: colour in half where the atlas has
-/// 8-bit sRGB, all else float32.
+/// The header of a part with the channels of these attributes, as large as a page: colour in half
+/// where the atlas has 8-bit sRGB, all else float32.
 [[nodiscard]] ExrPart exrPartOf(const AtlasHeader& header,
-                                const std::vector<ExrConstPixels>& pixels);
+                                const std::vector<std::string>& attributes);
+
+/// Writes attributes of a page, which must have them, as a part with that header. Colour is made
+/// linear a few rows at a time: of the whole page it would take twice the page. Errors: files.
+[[nodiscard]] Result<void> writePage(ExrWriter& writer, int part, const AtlasPage& page,
+                                     const std::vector<std::string>& attributes);
 
 /// Writes one texture of a folder as an OpenEXR file. Errors: files.
 [[nodiscard]] Result<void> writeFloatImage(const AtlasHeader& header, const AtlasPage& page,

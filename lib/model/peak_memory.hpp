@@ -32,6 +32,7 @@ namespace peak {
 inline constexpr PeakMemory kAtlas = {"an atlas", 24};
 // Of pages beside themselves, while they are written: pictures that are coded.
 inline constexpr PeakMemory kAtlasPages = {"an atlas", 16};
+inline constexpr PeakMemory kAtlasInExr = {"an atlas", 1};  // by a few rows at a time
 inline constexpr PeakMemory kAtlasPagesVectors = {"an atlas", 40};
 inline constexpr PeakMemory kBake = {"baking", 36, 24};  // the vectors that it adds
 inline constexpr PeakMemory kBakeToMpeg4 = {"baking into MPEG-4", 76};

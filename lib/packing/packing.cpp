@@ -21,7 +21,8 @@ struct Contents {
                (metallicRoughness ? 8 : 0) + (emissive ? 12 : 0);
     }
     /// What a page takes while it is written, bytes a pixel beside itself.
-    [[nodiscard]] std::uint64_t toWrite() const {
+    [[nodiscard]] std::uint64_t toWrite(const PackSettings& settings) const {
+        if (settings.bytesToWrite) return *settings.bytesToWrite;
         const bool more = normals || splats || metallicRoughness || emissive;
         return (more ? peak::kAtlasPagesVectors : peak::kAtlasPages).perPixel;
     }
@@ -281,9 +282,10 @@ std::uint64_t pixelsOf(const AtlasLayout& layout) {
 
 /// Of the pages, and with views that are in memory.
 Result<void> checkAtlas(const ViewTable& table, const AtlasLayout& layout, const Contents& contents,
-                        const Limits& limits) {
+                        const PackSettings& settings, const Limits& limits) {
     return limits.checkAllocation(
-        pixelsOf(layout), (table.whole() ? 2 : 1) * contents.bytesPerPixel() + contents.toWrite(),
+        pixelsOf(layout),
+        (table.whole() ? 2 : 1) * contents.bytesPerPixel() + contents.toWrite(settings),
         "an atlas");
 }
 
@@ -294,7 +296,7 @@ Result<void> checkGrid(const ViewTable& table, const PackSettings& settings, con
     const Contents contents = contentsOf(table.kinds());
     STX_TRY(const AtlasLayout layout,
             gridLayout(table.about(), settings, 4 / contents.texturesPerPage()));
-    return checkAtlas(table, layout, contents, limits);
+    return checkAtlas(table, layout, contents, settings, limits);
 }
 
 Result<std::uint64_t> memoryOfGrid(const ViewTable& table, const PackSettings& settings) {
@@ -305,7 +307,7 @@ Result<std::uint64_t> memoryOfGrid(const ViewTable& table, const PackSettings& s
     const std::uint64_t pixels = pixelsOf(layout);
     return pixels * contents.bytesPerPixel() +
            std::max(memoryOfEach(table, {"an atlas", 0}),
-                    table.bytesHeld() + pixels * contents.toWrite());
+                    table.bytesHeld() + pixels * contents.toWrite(settings));
 }
 
 Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& job) {
@@ -315,7 +317,7 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
     STX_TRY(AtlasLayout layout, layoutOf(table, settings, 4 / contents.texturesPerPage(), job));
     if (layout.rectangles.empty())
         return fail(ErrorCode::invalidInput, "none of the {} views has a point to pack", count);
-    STX_CHECK(checkAtlas(table, layout, contents, job.limits));
+    STX_CHECK(checkAtlas(table, layout, contents, settings, job.limits));
     Atlas atlas = emptyAtlas(table, layout, contents, settings);
     const bool tight = settings.layout == PackSettings::Layout::tight;
     const std::vector<int> source = keptViews(table.about(), tight, layout.rectangles, job);
