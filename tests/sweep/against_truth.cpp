@@ -52,6 +52,33 @@ Outcome drawnWhereEmpty(Pictures& pictures) {
     return out;
 }
 
+// Views of a room are covered up to their borders, so that what is hidden is filled; and through a
+// side without a wall they see that nothing is there.
+Outcome filledWhereEmpty(Pictures& pictures) {
+    Captured open = pictures.captured();
+    if (open.from.shape != SweepCase::room) return std::nullopt;
+    // The wall that the picture shows in one of its corners.
+    Scene walls;
+    walls.solids = {open.scene.solids.front()};
+    const int corner = pick(pictures, 331, 4);
+    const Hit wall = walls.trace(open.novel, corner & 1 ? open.novel.width - 1 : 1,
+                                 corner & 2 ? open.novel.height - 1 : 1);
+    open.scene.solids.front().openFace = wall.surface % 8;
+    for (ReferenceView& view : open.bundle.views) {
+        ReferenceView seen = look(open.scene, view.camera);
+        seen.name = view.name;
+        view = std::move(seen);
+    }
+    open.truth = look(open.scene, open.novel);
+    const Pictures opened(open);
+    STX_TRY(const Frame plain, drawBundle(open.bundle, open.novel, kNormal));
+    STX_TRY(const Frame filled, drawBundle(open.bundle, open.novel, kNormal, true));
+    const auto before = opened.drawnShare(plain), after = opened.drawnShare(filled);
+    if (!before || !after) return std::nullopt;
+    return Measure{*after - *before, fmt::format("drawn without filling {:.2f} %, with it {:.2f} %",
+                                                 *before, *after)};
+}
+
 Outcome betterQualityCoversLess(Pictures& pictures) {
     STX_TRY(const Frame* normal, pictures.of(kNormal));
     STX_TRY(const Frame* best, pictures.of(kBest));

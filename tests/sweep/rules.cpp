@@ -16,6 +16,8 @@ const std::vector<SweepRule>& rules() {
          measures::openWhereSeen},
         {"empty", "nothing is drawn where nothing is", 0.5, "%", "as for open places", 1,
          measures::drawnWhereEmpty},
+        {"filled-empty", "nothing is filled in where views see that nothing is", 0.5, "%",
+         "as for open places", 0.5, measures::filledWhereEmpty},
         {"quality-covers", "no quality covers less than the one below", 0.5, "%", "as asked", 1,
          measures::betterQualityCoversLess},
         {"quality-picture", "no quality is worse than the one below", 0.3, "dB", "as asked", 1,

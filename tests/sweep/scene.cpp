@@ -108,8 +108,10 @@ Meeting meet(const Solid& solid, glm::dvec3 from, glm::dvec3 direction) {
             return meetBall(solid.size.x, from, direction);
         case Solid::Kind::box:
             return meetBox(solid.size, from, direction, false);
-        case Solid::Kind::room:
-            return meetBox(solid.size, from, direction, true);
+        case Solid::Kind::room: {
+            const Meeting wall = meetBox(solid.size, from, direction, true);
+            return wall.face == solid.openFace ? Meeting{} : wall;
+        }
         case Solid::Kind::torus:
             return meetTorus(glm::dvec2(solid.size), from, direction);
         case Solid::Kind::cone:

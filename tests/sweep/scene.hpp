@@ -14,6 +14,7 @@ struct Solid {
     /// ball: x is the radius. box, room: half the sides. torus: radius of the ring (x) and of the
     /// tube (y) around the Y axis. cone: radius of the base (x) and half the height (y), tip up.
     glm::dvec3 size{1.0};
+    int openFace = -1;  ///< of a room: a side without a wall, 0..5; -1: it has all
 };
 
 /// Where a ray meets a scene.

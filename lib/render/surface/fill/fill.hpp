@@ -30,8 +30,9 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int wides
 
 /// Fills what is open from the background around it: for scenes that fill the frame. Filled is what
 /// a source looked at but something hid: where a ray, from the depth of the fill to twice that, is
-/// in its frustum, before its far plane, and it does not see past it; with a border of a twentieth
-/// of its picture. The rest stays open. Near surface along rays through the picture, beyond from a
+/// in its frustum, before its far plane, and no source sees past it; with a border of a twentieth
+/// of its picture. The rest stays open: the sky above a street is not filled because some source
+/// has a house before it. Near surface along rays through the picture, beyond from a
 /// picture of half the size that was filled before, so that the time grows with the pixels however
 /// large the openings are. Without any surface nothing is filled. Of frames that are averaged by
 /// `averagedBy` along each side afterwards, which must divide their sizes, the average is filled.

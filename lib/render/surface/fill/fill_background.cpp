@@ -20,7 +20,7 @@ struct LookedAt : SourcePixels {
     /// its far plane by this share of the distance, continues what it saw.
     static constexpr float kBorder = 0.05f;
 
-    /// Whether a source looked at a point without seeing past it, or almost looked at it.
+    /// Whether a source that does not see past a point looked at it, or almost did.
     [[nodiscard]] bool hides(int s, float x, float y, float q) {
         const vec4 h = warp(s, x, y, q);
         const auto farthest = static_cast<float>(axisOf(s).q((1 + kBorder) * at(s).view->farPlane));
@@ -31,7 +31,10 @@ struct LookedAt : SourcePixels {
             return h.x >= -border * width * h.w && h.x <= (1 + border) * width * h.w &&
                    h.y >= -border * height * h.w && h.y <= (1 + border) * height * h.w;
         };
-        return within(kBorder) && (!within(0.0f) || voteOf(s, x, y, q) == kNoVote);
+        return within(kBorder);
+    }
+    [[nodiscard]] bool seesPast(int s, float x, float y, float q) {
+        return voteOf(s, x, y, q) != kNoVote;
     }
 #include "shaders/shared/surface_votes.glsl"
 };
@@ -259,16 +262,25 @@ class RowFiller {
         const float y = (static_cast<float>(fill.y) + 0.5f) * static_cast<float>(of_.scale);
         const int count = static_cast<int>(of_.sources.size());
         const float apart = kFarthestShare * of_.frame.space.axis.relativeScale(fill.q) / kFarther;
-        for (int k = 0; k < count; ++k) {
-            const int s = (last_ + k) % count;
-            for (int step = 0; step <= kFarther; ++step) {
-                const float q = fill.q - apart * static_cast<float>(step);
-                if (!(q > 0.0f) || !places_.hides(s, x, y, q)) continue;
-                last_ = s;
-                return true;
-            }
+        for (int step = 0; step <= kFarther; ++step) {
+            const float q = fill.q - apart * static_cast<float>(step);
+            if (q > 0.0f && isHiddenAt(x, y, q, count)) return true;
         }
         return false;
+    }
+
+    /// Whether something hid it from a source, and no source sees past it.
+    bool isHiddenAt(float x, float y, float q, int count) {
+        bool hidden = false;
+        for (int k = 0; k < count; ++k) {
+            const int s = (last_ + k) % count;
+            if (places_.seesPast(s, x, y, q)) {
+                last_ = s;
+                return false;
+            }
+            hidden = hidden || places_.hides(s, x, y, q);
+        }
+        return hidden;
     }
 
     struct Near {
@@ -278,7 +290,7 @@ class RowFiller {
     };
     Of of_;
     shared::LookedAt places_;
-    int last_ = 0;  ///< the source that hid a place, which is likely to hide the next
+    int last_ = 0;  ///< the source that saw past a place, which is likely to see past the next
     RayBatch rays_;
     std::array<Near, kRayBatch> nearby_;
     std::vector<std::uint8_t> open_, filled_;
