@@ -64,7 +64,7 @@ Result<SetDescription> describeFiles(const path& path, const ImageSetOptions& op
 }
 
 Result<void> checkOptions(const ImageSetOptions& o) {
-    if (o.depthBits != 8 && o.depthBits != 16 && o.depthBits != 32)
+    if (o.depthBits != 0 && o.depthBits != 8 && o.depthBits != 16 && o.depthBits != 32)
         return fail(ErrorCode::usage, "depth in {} bits; 8, 16 and 32 are possible", o.depthBits);
     if (o.frame < 0) return fail(ErrorCode::usage, "frame {}; frames count from 0", o.frame);
     if (!(o.depthUnit >= 0) || std::isinf(o.depthUnit))

@@ -86,7 +86,9 @@ struct ImageSetOptions {
     /// Is told what they did, once for each moment that is read; null: nobody asks.
     std::function<void(const RefineReport&)> refined;
     YuvColour yuv;
-    int depthBits = 16;  ///< of the bundle's views: 8, 16 or 32 (float distances)
+    /// Of the bundle's views: 8, 16 or 32 (float distances). 0: what an export of ours had, else 16,
+    /// or 32 where 16 would round by more than an eighth of a pixel's size.
+    int depthBits = 0;
     /// Pictures of 16-bit integers become linear floats, of which they come back to the bit (then
     /// all pictures of the set do); else they are rounded to 8 bits, with a note.
     bool deepColour = false;

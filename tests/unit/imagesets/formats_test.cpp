@@ -394,6 +394,31 @@ TEST(Transforms, TheLargestCodeIsADistanceOnlyOfStepsThatAreNamed) {
     EXPECT_NEAR(named->views[0].depth.at(5, 4), 65.535, 1e-4);
 }
 
+/// A far value among near points, as renderers write for the sky, leaves 16 bits few codes for
+/// them.
+TEST(Transforms, DepthOfAWideRangeStaysFloats) {
+    auto views = roomViews(1);
+    TemporaryFolder folder;
+    writeColour(folder / "a.png", views[0]);
+    Job job;
+    const auto readFloats = [&](float far) -> ReferenceView {
+        Image<float> depth = views[0].depth;
+        depth.at(5, 4) = far;
+        const Bytes bytes = encodeNumpy(depth);
+        writeText(folder / "d.npy", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+        std::string json = transformsJson(views[0].camera, "");
+        json.replace(json.find("d.png"), 5, "d.npy");
+        writeText(folder / "transforms.json", json);
+        const auto read = readImageSet(folder.path(), {}, job);
+        EXPECT_TRUE(read) << read.error().text();
+        return read ? read->views[0] : ReferenceView();
+    };
+    EXPECT_EQ(readFloats(9).depthBits, 16);
+    const ReferenceView view = readFloats(65504);
+    EXPECT_EQ(view.depthBits, 32);
+    EXPECT_EQ(view.depth.at(6, 4), views[0].depth.at(6, 4));
+}
+
 // The principal point, 3.25 and -1.75 pixels from the middle, tells the size but for that.
 TEST(Transforms, WithoutTheSizeTakeThePicturesNearTheMiddle) {
     const auto views = roomViews(1);
