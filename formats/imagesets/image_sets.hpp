@@ -87,6 +87,10 @@ struct ImageSetOptions {
     std::function<void(const RefineReport&)> refined;
     YuvColour yuv;
     int depthBits = 16;  ///< of the bundle's views: 8, 16 or 32 (float distances)
+    /// Of a set that moves: depth is rounded to codes between the planes of its own frame. Whoever
+    /// rounds it between those of all frames wants it as it was: rounded twice, it would be off by
+    /// half a step of both.
+    bool roundFrames = true;
     /// Pictures of 16-bit integers become linear floats, of which they come back to the bit (then
     /// all pictures of the set do); else they are rounded to 8 bits, with a note.
     bool deepColour = false;

@@ -79,6 +79,8 @@ struct SceneReadOptions {
 /// The first string of the WorldInfo of scenes that are made from bundles.
 inline constexpr const char* kMadeByUs = "made by stx";
 
+class DepthLoss;
+
 struct SceneWriteOptions {
     enum class Texture { png, jpeg };
     enum class Nodes { automatic, v1, v2 };  ///< automatic: V2 for views with normals or splats
@@ -100,6 +102,8 @@ struct SceneWriteOptions {
     /// Where each view's depth is unknown, of a sequence without alpha (see UnknownPixels::text());
     /// empty: as its picture says.
     std::vector<std::string> unknownWhere;
+    /// Of sequences: hears how far off depth is, which is then noted for all frames; null: noted.
+    DepthLoss* depthLoss = nullptr;
 };
 
 /// A presentation of a bundle: Group { WorldInfo, DepthImage..., Background, Viewpoint,
