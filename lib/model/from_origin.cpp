@@ -3,6 +3,7 @@
 #include <optional>
 #include <utility>
 
+#include "lib/geometry/frustum.hpp"
 #include "lib/geometry/origin.hpp"
 
 namespace stx {
@@ -17,10 +18,8 @@ Bounds boxOfViews(const std::vector<ReferenceView>& views, bool planesKnown) {
             box.add(c.position);
             continue;
         }
-        for (const double dist : {view.nearPlane, view.farPlane})
-            for (const int x : {0, c.width})
-                for (const int y : {0, c.height})
-                    box.add(c.position + c.orientation * c.unproject(x, y, dist));
+        for (const glm::dvec3& corner : frustumCorners(c, view.nearPlane, view.farPlane))
+            box.add(corner);
     }
     return box;
 }
