@@ -213,7 +213,7 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
             return std::nullopt;
     }
     const auto imported = std::make_shared<bool>(false);
-    STX_TRY(auto frames, openSequence(input, openOptions(o, imported), program.job));
+    STX_TRY(auto frames, openSequence(input, openOptions(o, imported).into(target), program.job));
     const bool numbered = frameName(target.string(), 0).has_value();
     if (!frames->timeline().moves() && !numbered) {
         // What stands still goes the way that meshes and atlases take, too: no pixel has been read.

@@ -10,6 +10,7 @@
 #include "formats/meshes/meshes.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/stopwatch.hpp"
+#include "lib/model/from_origin.hpp"
 #include "lib/model/peak_memory.hpp"
 #include "lib/model/translucent.hpp"
 #include "lib/model/view_table.hpp"
@@ -276,6 +277,7 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
                               : wanted.ending == ".drc" ? peak::kPointsDraco
                                                         : peak::kPoints;
     STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
+    if (wanted.points) frames = fromOrigin(std::move(frames));
     STX_TRY(frames, refined(std::move(frames), o.refine, takes, folderBeside(o.output)));
     STX_TRY(const std::size_t moment,
             momentOf(o.time, frames->timeline(), wanted.points ? "points are" : nullptr, o.input,

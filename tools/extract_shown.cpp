@@ -9,6 +9,7 @@
 #include "formats/viewer/surfaces_glb.hpp"
 #include "formats/viewer/viewer_page.hpp"
 #include "lib/base/stopwatch.hpp"
+#include "lib/model/from_origin.hpp"
 #include "lib/model/peak_memory.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
@@ -40,10 +41,12 @@ Result<Shown> writePage(const std::string& input, const OpenOptions& open,
     STX_TRY(const auto kind, recognise(input));
     Result<PageReport> page = PageReport();
     if (kind == FileKind::atlas) {
-        STX_TRY(const auto atlas, openAtlas(input, open, program.job));
+        STX_TRY(auto atlas, openAtlas(input, open, program.job));
+        countFromOrigin(atlas);
         page = writeViewerPage(atlas, output, write, program.job);
     } else {
         STX_TRY(auto frames, openSequence(input, open, program.job));
+        frames = fromOrigin(std::move(frames));
         STX_TRY(frames, refined(std::move(frames), refine, peak::kPage, folderBeside(output)));
         page = writeViewerPage(*frames, output, write, program.job);
     }
@@ -84,6 +87,7 @@ Result<Shown> writeModel(const std::string& input, const OpenOptions& open,
                          Program& program) {
     STX_TRY(const auto settings, refineSettings(refine));
     STX_TRY(auto frames, openSequence(input, open, program.job));
+    frames = fromOrigin(std::move(frames));
     STX_TRY(const auto moment,
             momentOf(time, frames->timeline(), "a model is", input, program.job));
     STX_TRY(auto table, frames->views(moment, program.job));

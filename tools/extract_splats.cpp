@@ -12,6 +12,7 @@
 #include "formats/files/numbered.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "lib/base/stopwatch.hpp"
+#include "lib/model/from_origin.hpp"
 #include "lib/model/translucent.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/refining.hpp"
@@ -76,6 +77,7 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
                           Program& program) {
     const Stopwatch watch;
     STX_TRY(auto frames, openSequence(input, open, program.job));
+    frames = fromOrigin(std::move(frames));
     STX_TRY(frames,
             refined(std::move(frames), refine,
                     settings.most > 0 ? peak::kFewerSplats : peak::kSplats, folderBeside(output)));

@@ -147,7 +147,9 @@ void addMeshViewOptions(const Command& command, const std::shared_ptr<MeshViewOp
     c.option("--plot", o->plot, "With auto: draw quality against the number of views")
         .writes("FILE.svg");
     c.under("Coding")
-        .option("--depth-bits", o->depthBits, "8, 16 or 32 (float, .exr only); default 16 (image sets: 32 where 16 are too coarse)")
+        .option(
+            "--depth-bits", o->depthBits,
+            "8, 16 or 32 (float, .exr only); default 16 (image sets: 32 where 16 are too coarse)")
         .oneOf({8, 16, 32});
 }
 

@@ -70,6 +70,13 @@ Error notThere(const fs::path& path) {
 
 }  // namespace
 
+OpenOptions OpenOptions::into(const fs::path& target) const {
+    OpenOptions out = *this;
+    out.set.deepColour = set.deepColour || lowerExtension(target) == ".exr";
+    out.set.roundFrames = set.roundFrames && !mpeg4ContainerOf(target);
+    return out;
+}
+
 const char* nameOf(FileKind kind) {
     switch (kind) {
         case FileKind::mesh:

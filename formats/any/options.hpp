@@ -18,13 +18,9 @@ struct OpenOptions {
     bool keepColourFiles = false;  ///< MPEG-4: see ColourFile
     ImageSetOptions set;  ///< of image sets; with set.from whatever is given is read as one
 
-    /// The same for what is written to `target`: an OpenEXR file keeps colours of 16 bits.
-    [[nodiscard]] OpenOptions into(const std::filesystem::path& target) const {
-        OpenOptions out = *this;
-        const std::filesystem::path ending = target.extension();
-        out.set.deepColour = set.deepColour || ending == ".exr" || ending == ".EXR";
-        return out;
-    }
+    /// The same for what is written to `target`: an OpenEXR file keeps colours of 16 bits, and an
+    /// MPEG-4 film rounds the depth of its frames itself.
+    [[nodiscard]] OpenOptions into(const std::filesystem::path& target) const;
 };
 
 struct SaveOptions {

@@ -310,7 +310,9 @@ class SetSequence : public Sequence {
 class StillSet : public Sequence {
   public:
     StillSet(std::string where, ImageSetOptions options, SetDescription set)
-        : where_(std::move(where)), options_(std::move(options)), set_(std::move(set)) {}
+        : where_(std::move(where)), options_(std::move(options)), set_(std::move(set)) {
+        options_.roundFrames = true;  // it has no frames
+    }
 
     Result<Bundle> frame(std::size_t index, Job& job) override {
         if (index > 0)

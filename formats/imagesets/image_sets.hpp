@@ -86,9 +86,13 @@ struct ImageSetOptions {
     /// Is told what they did, once for each moment that is read; null: nobody asks.
     std::function<void(const RefineReport&)> refined;
     YuvColour yuv;
-    /// Of the bundle's views: 8, 16 or 32 (float distances). 0: what an export of ours had, else 16,
-    /// or 32 where 16 would round by more than an eighth of a pixel's size.
+    /// Of the bundle's views: 8, 16 or 32 (float distances). 0: what an export of ours had, else
+    /// 16, or 32 where 16 would round by more than an eighth of a pixel's size.
     int depthBits = 0;
+    /// Of a set that moves: depth is rounded to codes between the planes of its own frame. Whoever
+    /// rounds it between those of all frames wants it as it was: rounded twice, it would be off by
+    /// half a step of both.
+    bool roundFrames = true;
     /// Pictures of 16-bit integers become linear floats, of which they come back to the bit (then
     /// all pictures of the set do); else they are rounded to 8 bits, with a note.
     bool deepColour = false;

@@ -124,8 +124,7 @@ NoDepth noDepthOf(const SetView& set, const ImageSetOptions& options, StoredView
 }
 
 bool anyPoint(const Image<float>& depth) {
-    return std::any_of(depth.pixels().begin(), depth.pixels().end(),
-                       [](float d) { return hasPoint(d); });
+    return std::ranges::any_of(depth.pixels(), hasPoint);
 }
 
 /// Takes away what a mask does not show: its grey, and its alpha where it has one, is the share of
@@ -210,8 +209,8 @@ void setPlanes(ReferenceView& view, const SetView& set, const ImageSetOptions& o
     view.depthBits = 32;
     fitDepthRange(view);
     view.depthBits = bitsFor(view, options);
-    if (view.depthBits < 32) fitDepthRange(view);
-    if (view.depthBits == 8)
+    if (view.depthBits < 32 && options.roundFrames) fitDepthRange(view);
+    if (view.depthBits == 8 && options.roundFrames)
         job.note(fmt::format(
             "view '{}': depth in 8 bits is exact to {:.3g} scene units (16 bits: "
             "{:.2g})",

@@ -58,7 +58,8 @@ struct SceneReadOptions {
 /// child counts; a node used twice gives two views. A PointTexture gives as many views with the
 /// same camera as a pixel has depths; an OctreeImage gives a view for each of its images, with the
 /// depths of the voxels that it sees first. Views are named by DEF name. Title, bounds and
-/// origin come from WorldInfo. Errors (invalidInput) name the view and what is wrong; Transforms
+/// origin come from WorldInfo; bounds are left out where a view sees nothing of them between its
+/// planes. Errors (invalidInput) name the view and what is wrong; Transforms
 /// that scale unevenly, shear or mirror are refused. Notes say what is left out.
 [[nodiscard]] Result<Bundle> bundleFromScene(const Document& document,
                                              const SceneReadOptions& options, Job& job);
@@ -78,6 +79,8 @@ struct SceneReadOptions {
 
 /// The first string of the WorldInfo of scenes that are made from bundles.
 inline constexpr const char* kMadeByUs = "made by stx";
+
+class DepthLoss;
 
 struct SceneWriteOptions {
     enum class Texture { png, jpeg };
@@ -100,6 +103,8 @@ struct SceneWriteOptions {
     /// Where each view's depth is unknown, of a sequence without alpha (see UnknownPixels::text());
     /// empty: as its picture says.
     std::vector<std::string> unknownWhere;
+    /// Of sequences: hears how far off depth is, which is then noted for all frames; null: noted.
+    DepthLoss* depthLoss = nullptr;
 };
 
 /// A presentation of a bundle: Group { WorldInfo, DepthImage..., Background, Viewpoint,

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <set>
 #include <unordered_map>
 #include <unordered_set>
@@ -13,6 +14,7 @@
 #include "formats/mpeg4/mapping/view_read.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/geometry/frustum.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -50,6 +52,7 @@ class BundleReader {
         });
         STX_CHECK(job_.checkCancelled());
         Bundle bundle = object.about;
+        std::vector<bool> known;
         for (std::size_t i = 0; i < plans.size(); ++i) {
             if (!read[i]) {
                 const Error error =
@@ -62,12 +65,14 @@ class BundleReader {
                 ReferenceView& view = (*read[i])[layer];
                 place(view, plans[i], object.notes, static_cast<int>(layer));
                 bundle.views.push_back(std::move(view));
+                known.push_back(planesSaySomething(plans[i]));
             }
         }
         if (bundle.views.size() > static_cast<std::size_t>(job_.limits.maxViews))
             return fail(ErrorCode::invalidInput, "the scene has {} views; at most {} are read",
                         bundle.views.size(), job_.limits.maxViews);
         makeNamesUnique(bundle);
+        leaveOutStaleBounds(bundle, known);
         if (options_.pixels && options_.environment)
             STX_SET(bundle.environment,
                     boundEnvironment(object.backgrounds, images, options_.decode, job_));
@@ -111,6 +116,7 @@ class BundleReader {
         const ViewReader reader(options_, images, job_);
         Headers headers;
         headers.bundle = object.about;
+        std::vector<bool> known;
         for (const ViewPlan& plan : object.plans) {
             const auto kinds = reader.knownKinds(plan);
             if (!kinds || hasMask(plan, object.notes)) return {};
@@ -121,8 +127,10 @@ class BundleReader {
             place(view, plan, object.notes, 0);
             headers.bundle.views.push_back(std::move(view));
             headers.kinds.push_back(*kinds);
+            known.push_back(planesSaySomething(plan));
         }
         makeNamesUnique(headers.bundle);
+        leaveOutStaleBounds(headers.bundle, known);
         return headers;
     }
 
@@ -208,6 +216,34 @@ class BundleReader {
         if (const auto said = notes.views.find(plan.key); said != notes.views.end())
             applyNotes(view, plan, said->second, layer);
         applySimilarity(view, plan.worldFromLocal);
+    }
+    /// Whether the planes of a view are around its points. Those of an OctreeImage are not, and a
+    /// view without a point is written with the values that the fields have by themselves.
+    static bool planesSaySomething(const ViewPlan& plan) {
+        return !plan.octree && !(plan.depthImage->get<float>("nearPlane") == 10.0f &&
+                                 plan.depthImage->get<float>("farPlane") == 100.0f);
+    }
+    /// Text may be edited: bounds of which some view sees nothing between its planes are not those
+    /// of the views. `known`: planesSaySomething() of each.
+    void leaveOutStaleBounds(Bundle& bundle, const std::vector<bool>& known) {
+        if (!bundle.bounds || bundle.bounds->empty()) return;
+        // Cameras and planes are floats: their last bit, of three values that add up.
+        constexpr double kRounding = 4 * std::numeric_limits<float>::epsilon();
+        const Bounds& box = *bundle.bounds;
+        const glm::dvec3 corner = glm::max(glm::abs(box.min), glm::abs(box.max));
+        for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+            const ReferenceView& view = bundle.views[i];
+            const double slack = kRounding * (glm::length(corner) +
+                                              glm::length(view.camera.position) + view.farPlane);
+            if (!known[i] || !apart(view.camera, view.nearPlane, view.farPlane, box, slack))
+                continue;
+            job_.note(fmt::format(
+                "the bounds that WorldInfo states are left out: view '{}' sees nothing of them "
+                "between its planes",
+                view.name));
+            bundle.bounds.reset();
+            return;
+        }
     }
     /// Whether a WorldInfo has a picture of what is unknown in a view, which may be damaged.
     static bool hasMask(const ViewPlan& plan, const ViewNotes& notes) {

@@ -380,22 +380,14 @@ class SceneWriter {
                 "{}: its principal point is off the centre; padded by {} {} {} {} pixels (left, "
                 "top, right, bottom), the rest of {:.3g} pixels is moved",
                 viewName(i), p.left, p.top, p.right, p.bottom, p.shift));
-        const int bits = bitsOf(view);
-        // Depth that is on the codes already is off by what floats are, which is not worth a word.
-        const double rounding = std::max(0.01 * view.depthCode().step(), 1e-6 * view.farPlane);
-        if (view.depthBits == 32 || bits < view.depthBits ||
-            (bits == 8 && images.worstDepth > rounding)) {
-            worst_ = std::max(worst_, images.worstDepth);
-            lossyBits_ = lossyBits_ == 0 ? bits : std::min(lossyBits_, bits);
-        }
+        (options_.depthLoss ? *options_.depthLoss : depthLoss_)
+            .add(view, bitsOf(view), images.worstDepth);
         clamped_ = clamped_ || images.clamped;
         coverageLost_ = coverageLost_ || images.coverageLost;
         dropped_ = dropped_ || (!isV2(view) && (view.hasNormals() || view.hasSplats()));
     }
     void sayTotals() {
-        if (worst_ > 0)
-            job_.note(fmt::format("depth is rounded to {} bits: at most {:.4g} scene units off",
-                                  lossyBits_, worst_));
+        depthLoss_.note(job_);
         if (table_.kindsOf(0).linear)
             job_.note(clamped_ ? "linear colour becomes 8-bit sRGB; values above 1 are clipped"
                                : "linear colour becomes 8-bit sRGB");
@@ -416,8 +408,7 @@ class SceneWriter {
     UpdateObjectDescriptors update_;
     Bounds bounds_;
     std::set<std::string> taken_;
-    double worst_ = 0;
-    int lossyBits_ = 0;
+    DepthLoss depthLoss_;
     bool clamped_ = false, coverageLost_ = false, dropped_ = false, vectorsLost_ = false;
 };
 

@@ -241,28 +241,45 @@ Result<Camera> cameraAlong(const Camera& view, glm::ivec3 first, glm::ivec3 last
     return c;
 }
 
+/// Colour of the first voxel behind the centre of a pixel; nothing where there is none.
+std::optional<glm::u8vec3> colourBehind(const Camera& camera, int x, int y, const Octree& octree,
+                                        const std::vector<OctreeSample>& voxels) {
+    glm::ivec3 voxel(0);
+    const glm::dvec3 origin =
+        camera.position + camera.orientation * camera.unproject(x + 0.5, y + 0.5, 0.0);
+    if (!(octree.firstHit(origin, camera.forward(), &voxel) < kNoDepth)) return {};
+    const std::uint64_t code = codeOf(voxel);
+    const auto found = std::lower_bound(
+        voxels.begin(), voxels.end(), code,
+        [](const OctreeSample& sample, std::uint64_t wanted) { return sample.code < wanted; });
+    if (found == voxels.end() || found->code != code) return {};
+    return found->colour;
+}
+
 Rgba8Image pictureOf(const Camera& camera, const Octree& octree,
                      const std::vector<OctreeSample>& voxels, const Job& job) {
     Rgba8Image picture(camera.width, camera.height, glm::u8vec4(0));
-    for (int y = 0; y < camera.height && !job.cancelled; ++y) {
-        for (int x = 0; x < camera.width; ++x) {
-            glm::ivec3 voxel(0);
-            const glm::dvec3 origin =
-                camera.position + camera.orientation * camera.unproject(x + 0.5, y + 0.5, 0.0);
-            if (!(octree.firstHit(origin, camera.forward(), &voxel) < kNoDepth)) continue;
-            const std::uint64_t code = codeOf(voxel);
-            const auto found =
-                std::lower_bound(voxels.begin(), voxels.end(), code,
-                                 [](const OctreeSample& sample, std::uint64_t wanted) {
-                                     return sample.code < wanted;
-                                 });
-            if (found != voxels.end() && found->code == code)
-                picture.at(x, y) = glm::u8vec4(found->colour, 255);
-        }
-    }
+    for (int y = 0; y < camera.height && !job.cancelled; ++y)
+        for (int x = 0; x < camera.width; ++x)
+            if (const auto colour = colourBehind(camera, x, y, octree, voxels))
+                picture.at(x, y) = glm::u8vec4(*colour, 255);
     Texture texture(std::move(picture));
     bleedColour(texture);
     return std::move(*texture.rgba8());
+}
+
+/// Voxels reach past silhouettes, where a picture may have any colour under alpha 0: it gets
+/// theirs.
+void colourPastSilhouettes(OctreeParts::Picture& picture, const Octree& octree,
+                           const std::vector<OctreeSample>& voxels, const Job& job) {
+    for (int y = 0; y < picture.camera.height && !job.cancelled; ++y) {
+        for (int x = 0; x < picture.camera.width; ++x) {
+            glm::u8vec4& pixel = picture.colour.at(x, y);
+            if (pixel.a > 0) continue;
+            if (const auto colour = colourBehind(picture.camera, x, y, octree, voxels))
+                pixel = glm::u8vec4(*colour, 255);
+        }
+    }
 }
 
 }  // namespace
@@ -321,6 +338,7 @@ Result<OctreeParts> octreeFromBundle(const Bundle& bundle, int levels, Job& job)
             picture.camera.fx *= parts.side;
             picture.camera.fy *= parts.side;
             picture.colour = std::move(colours[at]);
+            colourPastSilhouettes(picture, octree, samples, job);
             return {};
         }
         STX_TRY(picture.camera,

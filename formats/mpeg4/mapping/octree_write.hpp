@@ -36,10 +36,11 @@ struct OctreeParts {
 
 /// Voxels wherever a view has a point; between neighbouring pixels of one surface, too. The cube is
 /// fitted to the points; to orthographic views, such that what was read as an OctreeImage gives the
-/// same voxels again. Orthographic views keep their pictures; of a perspective view, the
-/// picture is what the voxels look like along its axis, a pixel a voxel. `levels`: 1 to
-/// kMaxOctreeLevels. Errors: (usage) other levels; (invalidInput) a bundle without a point, or with
-/// a wrong depth; (unsupported) pictures that become too large; memory over the limit; cancelled.
+/// same voxels again. Orthographic views keep their pictures, but where alpha is 0 those
+/// of their pixels that show a voxel get its colour; of a perspective view, the picture is what the
+/// voxels look like along its axis, a pixel a voxel. `levels`: 1 to kMaxOctreeLevels. Errors:
+/// (usage) other levels; (invalidInput) a bundle without a point, or with a wrong depth;
+/// (unsupported) pictures that become too large; memory over the limit; cancelled.
 [[nodiscard]] Result<OctreeParts> octreeFromBundle(const Bundle& bundle, int levels, Job& job);
 
 }  // namespace stx::mpeg4

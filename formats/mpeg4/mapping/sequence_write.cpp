@@ -253,6 +253,7 @@ class SequenceWriter {
             options.unknownWhere.emplace_back();
             if (range.unknown.any()) STX_SET(options.unknownWhere.back(), range.unknown.text());
         }
+        if (!asVideo()) options.depthLoss = &depthLoss_;
         std::vector<ViewBefore> before(table->count());
         table = watchedViews(std::move(table), [&](std::size_t k, const ReferenceView& view) {
             before[k] = ViewBefore::of(view);
@@ -401,6 +402,7 @@ class SequenceWriter {
 
     Result<void> addImages(ViewTrack& track, const ViewImages& images, const ViewHeader& view,
                            std::uint64_t now) {
+        depthLoss_.add(view, writtenDepthBits(view, options_), images.worstDepth);
         std::array<CodedImage, kRoles.size()> found;
         bool any = false;
         for (std::size_t r = 0; r < kRoles.size(); ++r) {
@@ -518,7 +520,7 @@ class SequenceWriter {
     /// Durations, and MovieTextures where a stream has become one.
     Result<void> finish() {
         STX_CHECK(video_->finish());
-        if (asVideo()) noteVideo();
+        asVideo() ? noteVideo() : depthLoss_.note(job_);
         STX_TRY(const ByteSource source, spool_.source());
         for (const ViewTrack& track : tracks_)
             for (ElementaryStream* stream : track.streams)
@@ -564,7 +566,8 @@ class SequenceWriter {
     std::vector<ViewTrack> tracks_;
     std::uint32_t scale_ = 1000;
     std::optional<VideoStreams> video_;
-    double worstDepth_ = 0;
+    DepthLoss depthLoss_;    ///< of pictures
+    double worstDepth_ = 0;  ///< of video
     bool coverageLost_ = false;
 };
 

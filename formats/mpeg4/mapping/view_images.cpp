@@ -1,5 +1,6 @@
 #include "formats/mpeg4/mapping/view_images.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -44,6 +45,21 @@ int writtenDepthBits(const ViewHeader& view, const SceneWriteOptions& options) {
 float longestSplatOf(const ReferenceView& view) {
     const float longest = std::max(largestComponent(view.splatU), largestComponent(view.splatV));
     return longest > 0 ? longest : 1.0f;
+}
+
+void DepthLoss::add(const ViewHeader& view, int bits, double worstDepth) {
+    // Depth that is on the codes already is off by what floats are, which is not worth a word.
+    const double rounding = std::max(0.01 * view.depthCode().step(), 1e-6 * view.farPlane);
+    if (view.depthBits != 32 && bits >= view.depthBits && !(bits == 8 && worstDepth > rounding))
+        return;
+    worst_ = std::max(worst_, worstDepth);
+    bits_ = bits_ == 0 ? bits : std::min(bits_, bits);
+}
+
+void DepthLoss::note(Job& job) const {
+    if (worst_ > 0)
+        job.note(fmt::format("depth is rounded to {} bits: at most {:.4g} scene units off", bits_,
+                             worst_));
 }
 
 Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions& options,

@@ -19,6 +19,19 @@ struct ViewImages {
     bool coverageLost = false;
 };
 
+/// The largest error of depth that is rounded to codes, for a note.
+class DepthLoss {
+  public:
+    /// Of a view whose depth is written in `bits`, with ViewImages::worstDepth.
+    void add(const ViewHeader& view, int bits, double worstDepth);
+    /// Says how far off depth is, if some is.
+    void note(Job& job) const;
+
+  private:
+    double worst_ = 0;  ///< scene units
+    int bits_ = 0;
+};
+
 /// Encodes the images of a view. `longestSplat` above 0: the range of the splats, of a sequence
 /// whose frames share it; else the view's own. Errors: a principal point that padding cannot
 /// centre, planes that do not fit floats, a depth that is NaN or below 0; those of the image

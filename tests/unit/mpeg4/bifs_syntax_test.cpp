@@ -24,8 +24,8 @@ Bytes bits(std::string_view text) {
     return out.finish();
 }
 
-std::string errorOf(std::string_view text, const BifsConfig& config = configOf(3),
-                    const Limits& limits = {}) {
+std::string syntaxErrorOf(std::string_view text, const BifsConfig& config = configOf(3),
+                          const Limits& limits = {}) {
     BifsDecoder decoder(config, limits);
     const auto commands = decoder.decode(bits(text));
     return commands ? "decoded" : commands.error().text();
@@ -124,52 +124,56 @@ TEST(BifsSyntax, EveryKindOfCommandComesBack) {
 }
 
 TEST(BifsSyntax, WhatCannotBeReadIsToldWithItsBit) {
-    EXPECT_NE(errorOf("").find("bit 0: the access unit ends"), std::string::npos) << errorOf("");
-    EXPECT_NE(errorOf("11 000000 0 1").find("the access unit ends"), std::string::npos);
-    EXPECT_NE(errorOf("11 000000 0 0 0 111").find("node code 7 of SFTopNode version 1"),
+    EXPECT_NE(syntaxErrorOf("").find("bit 0: the access unit ends"), std::string::npos)
+        << syntaxErrorOf("");
+    EXPECT_NE(syntaxErrorOf("11 000000 0 1").find("the access unit ends"), std::string::npos);
+    EXPECT_NE(syntaxErrorOf("11 000000 0 0 0 111").find("node code 7 of SFTopNode version 1"),
               std::string::npos);
     // Code 0 in all ten versions: 3 + 1 bits, then nothing.
-    EXPECT_NE(errorOf("11 000000 0 0 0 000 0").find("0 in every version"), std::string::npos);
-    EXPECT_NE(errorOf("11 000000 0 0 0 000 1").find("PROTO"), std::string::npos);
-    EXPECT_NE(errorOf("11 000000 0 0 1 010").find("bit 14: USE of node id 3"), std::string::npos);
-    EXPECT_NE(errorOf("10 01 010").find("names node id 3"), std::string::npos);
-    EXPECT_NE(errorOf("00 01 00001001").find("extended"), std::string::npos);
+    EXPECT_NE(syntaxErrorOf("11 000000 0 0 0 000 0").find("0 in every version"), std::string::npos);
+    EXPECT_NE(syntaxErrorOf("11 000000 0 0 0 000 1").find("PROTO"), std::string::npos);
+    EXPECT_NE(syntaxErrorOf("11 000000 0 0 1 010").find("bit 14: USE of node id 3"),
+              std::string::npos);
+    EXPECT_NE(syntaxErrorOf("10 01 010").find("names node id 3"), std::string::npos);
+    EXPECT_NE(syntaxErrorOf("00 01 00001001").find("extended"), std::string::npos);
     const std::string group(kGroup);
     // DEF 1 Group { children [ USE 1 ] } as a mask and a vector of one.
-    EXPECT_NE(errorOf(group + "1 000 1 1 0 0 00001 1  1 000").find("used inside itself"),
+    EXPECT_NE(syntaxErrorOf(group + "1 000 1 1 0 0 00001 1  1 000").find("used inside itself"),
               std::string::npos);
     // Two children with the id of the first.
-    EXPECT_NE(errorOf(group + "0 1 1 0 0 00010 10  0 010001 1 000 0 1  0 010001 1 000")
+    EXPECT_NE(syntaxErrorOf(group + "0 1 1 0 0 00010 10  0 010001 1 000 0 1  0 010001 1 000")
                   .find("defined twice"),
               std::string::npos);
     // USE of a Group as diTexture: children [DEF 1 Group, DepthImage { diTexture USE 1 }].
     EXPECT_NE(
-        errorOf(group +
-                "0 1 1 0 0 00010 10  0 010001 1 000 0 1  0 000000 000 00 000 00011 0 1 1 1 000")
+        syntaxErrorOf(
+            group + "0 1 1 0 0 00010 10  0 010001 1 000 0 1  0 000000 000 00 000 00011 0 1 1 1 000")
             .find("a Group, where SFDepthTextureNode"),
         std::string::npos);
     // A vector of 2^31 - 1 children, and a string of as many bytes.
-    EXPECT_NE(errorOf(group + "0 1 1 0 0 11111 1111111111111111111111111111111")
+    EXPECT_NE(syntaxErrorOf(group + "0 1 1 0 0 11111 1111111111111111111111111111111")
                   .find("Group.children has 2147483647 items"),
               std::string::npos);
     EXPECT_NE(
-        errorOf(group + "0 1 1 0 0 00001 1 0 110100 0 1 0 1 11111 1111111111111111111111111111111")
+        syntaxErrorOf(group +
+                      "0 1 1 0 0 00001 1 0 110100 0 1 0 1 11111 1111111111111111111111111111111")
             .find("a string of 2147483647 bytes"),
         std::string::npos);
     // NULL among the children.
-    EXPECT_NE(errorOf(group + "0 1 1 0 0 00001 1  1 111").find("NULL among its nodes"),
+    EXPECT_NE(syntaxErrorOf(group + "0 1 1 0 0 00001 1  1 111").find("NULL among its nodes"),
               std::string::npos);
     BifsConfig predictive = configOf(3);
     predictive.version = 2;
     predictive.usePredictiveMFField = true;
-    EXPECT_NE(errorOf(group + "0 1 1 1", predictive).find("predictive"), std::string::npos);
+    EXPECT_NE(syntaxErrorOf(group + "0 1 1 1", predictive).find("predictive"), std::string::npos);
 }
 
 TEST(BifsSyntax, NestingAndMemoryAreBounded) {
     // Groups in groups, 5 bits of head each, for ever.
     std::string deep(kGroup);
     for (int i = 0; i < 2000; ++i) deep += "0 1 1 0 1 0  0 010001 ";
-    EXPECT_NE(errorOf(deep).find("nested more than 256 deep"), std::string::npos) << errorOf(deep);
+    EXPECT_NE(syntaxErrorOf(deep).find("nested more than 256 deep"), std::string::npos)
+        << syntaxErrorOf(deep);
 
     // The same by USE: each child holds the one before it.
     NodePtr inner = makeNode("Group");
@@ -196,9 +200,9 @@ TEST(BifsSyntax, NestingAndMemoryAreBounded) {
     for (int i = 0; i < 100'000; ++i) many += "0010001001";
     Limits limits;
     limits.maxMemoryBytes = 1 << 20;
-    EXPECT_NE(errorOf(many, configOf(3), limits).find("needs more than the 1048576 bytes"),
+    EXPECT_NE(syntaxErrorOf(many, configOf(3), limits).find("needs more than the 1048576 bytes"),
               std::string::npos)
-        << errorOf(many, configOf(3), limits);
+        << syntaxErrorOf(many, configOf(3), limits);
 }
 
 TEST(BifsSyntax, WhatHasNoCodeIsNotWritten) {

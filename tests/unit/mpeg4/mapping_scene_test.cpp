@@ -6,13 +6,15 @@ namespace stx::mpeg4 {
 namespace {
 
 const std::string kBounds = "WorldInfo { info [\"bounds 1 0 0 2 1 0.5\"] } ";
+/// Of a depthImage(kSeesBounds) that has them between its planes.
+const std::string kSeesBounds = "position 1.5 0.5 9";
 
 void expectNear(glm::dvec3 a, glm::dvec3 b) {
     EXPECT_LT(glm::length(a - b), 1e-6) << a.x << " " << a.y << " " << a.z;
 }
 
 TEST(StatedBounds, FollowTheTransformsAboveThem) {
-    const std::string object = kBounds + depthImage();
+    const std::string object = kBounds + depthImage(kSeesBounds);
     const Bundle plain = mustRead(object);
     ASSERT_TRUE(plain.bounds);
     EXPECT_EQ(plain.bounds->min, glm::dvec3(1, 0, 0));
@@ -33,11 +35,52 @@ TEST(StatedBounds, FollowTheTransformsAboveThem) {
 }
 
 TEST(StatedBounds, OfTwoObjectsAreUnited) {
-    const Bundle two = mustRead("Transform { translation 10 0 0 children [ " + kBounds +
-                                depthImage() + " ] } " + kBounds + depthImage());
+    const Bundle two =
+        mustRead("Transform { translation 10 0 0 children [ " + kBounds + depthImage(kSeesBounds) +
+                 " ] } " + kBounds + depthImage(kSeesBounds));
     ASSERT_TRUE(two.bounds);
     expectNear(two.bounds->min, {1, 0, 0});
     expectNear(two.bounds->max, {12, 1, 0.5});
+}
+
+/// What is read of nodes, and the notes.
+std::pair<Bundle, std::vector<std::string>> readWithNotes(const std::string& nodes, bool pixels) {
+    Job job;
+    const auto document = readBt("Group { children [ " + nodes + " ] }", "test.bt", job);
+    EXPECT_TRUE(document);
+    SceneReadOptions options;
+    options.pixels = pixels;
+    auto bundle = bundleFromScene(*document, options, job);
+    if (!bundle) ADD_FAILURE() << bundle.error().text();
+    return {bundle ? std::move(*bundle) : Bundle(), job.takeNotes()};
+}
+
+/// Text is edited by hand: positions, and the WorldInfo stays as it was.
+TEST(StatedBounds, AreNotBelievedWhereAViewSeesNothingOfThem) {
+    for (const bool pixels : {true, false}) {
+        for (const char* position : {"position 101.5 0.5 9", "position 1.5 -20 9",
+                                     "position 1.5 0.5 0.6", "position 1.5 0.5 30"}) {
+            const auto [bundle, notes] = readWithNotes(
+                kBounds + depthImage(kSeesBounds) + " DEF Moved " + depthImage(position), pixels);
+            EXPECT_FALSE(bundle.bounds) << position;
+            ASSERT_EQ(notes.size(), 1u) << position;
+            EXPECT_EQ(notes[0],
+                      "the bounds that WorldInfo states are left out: view 'Moved' sees nothing of "
+                      "them between its planes");
+        }
+    }
+}
+
+/// The planes of a view without a point are those that the fields have by themselves.
+TEST(StatedBounds, AreBelievedBesideAViewWhosePlanesSayNothing) {
+    const auto [bundle, notes] = readWithNotes(
+        kBounds + depthImage(kSeesBounds) +
+            " DEF Empty DepthImage { orthographic FALSE fieldOfView 0.5 0.5 position 0 0 500 "
+            "diTexture " +
+            kPixels + " }",
+        true);
+    EXPECT_TRUE(bundle.bounds);
+    EXPECT_TRUE(notes.empty()) << notes[0];
 }
 
 TEST(StatedBounds, AreNotBelievedWhereViewsWereMovedWithoutThem) {

@@ -143,6 +143,43 @@ TEST(OctreeWriting, PerspectiveViewsBecomePicturesOfTheVoxels) {
     expectSamePictures(bundleOf(again), back);
 }
 
+/// Voxels reach past the silhouette of a disc. Its pictures are black beyond it, as renderers leave
+/// them, and the disc has no black.
+TEST(OctreeWriting, VoxelsPastTheSilhouetteHaveTheColourOfTheObject) {
+    constexpr int kSide = 48;
+    const glm::u8vec4 red(200, 60, 40, 255);
+    ReferenceView view;
+    view.name = "disc";
+    view.camera.orthographic = true;
+    view.camera.width = view.camera.height = kSide;
+    view.camera.fx = view.camera.fy = kSide / 2.4;
+    view.camera.cx = view.camera.cy = kSide / 2.0;
+    view.camera.position = {0, 0, 2};
+    view.nearPlane = 1;
+    view.farPlane = 3;
+    view.depth = Image<float>(kSide, kSide, kNoDepth);
+    Rgba8Image colour(kSide, kSide, glm::u8vec4(0));
+    for (int y = 0; y < kSide; ++y)
+        for (int x = 0; x < kSide; ++x)
+            if (std::hypot(x + 0.5 - kSide / 2.0, y + 0.5 - kSide / 2.0) < 20) {
+                view.depth.at(x, y) = 2;
+                colour.at(x, y) = red;
+            }
+    view.texture = colour;
+    Bundle disc;
+    disc.views = {view};
+
+    const Bundle back = bundleOf(writtenAs(disc, 3));
+    ASSERT_EQ(back.views.size(), 1u);
+    const ReferenceView& seen = back.views[0];
+    EXPECT_GT(seen.pointCount(), view.pointCount()) << "voxels do not reach past the disc";
+    for (std::size_t i = 0; i < seen.depth.count(); ++i) {
+        if (hasPoint(seen.depth.pixels()[i])) {
+            ASSERT_EQ(seen.texture.rgba8()->pixels()[i], red) << i;
+        }
+    }
+}
+
 TEST(OctreeWriting, SaysWhatIsLost) {
     Bundle bundle;
     bundle.views = {makeView(8, 6, 16, 1)};

@@ -1,5 +1,7 @@
 // Image sets with time: which pictures belong to which camera, and what a moment shows.
 
+#include <cstdio>
+
 #include "formats/any/sequences.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/imagesets/image_sets.hpp"
@@ -400,6 +402,61 @@ TEST(MovingSets, MasksTakeAwayWhatIsNotTheObject) {
     const auto missing = opened(set, options)->frame(0, job);
     ASSERT_FALSE(missing);
     EXPECT_EQ(missing.error().code, ErrorCode::io);
+}
+
+/// Frames whose own depth ranges differ: the codes of a film are those of all frames.
+TEST(MovingSets, DepthOfAFilmIsRoundedOnce) {
+    constexpr int kWidth = 64, kHeight = 4, kFrames = 4;
+    const auto depthAt = [](int frame, int i) { return 1000 + 3 * i + 37 * frame; };
+    TemporaryFolder folder;
+    std::string frames;
+    for (int k = 0; k < kFrames; ++k) {
+        std::vector<std::uint16_t> depth(kWidth * kHeight);
+        for (std::size_t i = 0; i < depth.size(); ++i)
+            depth[i] = static_cast<std::uint16_t>(depthAt(k, static_cast<int>(i)));
+        const std::vector<std::uint8_t> rgb(kWidth * kHeight * 3, static_cast<std::uint8_t>(k));
+        writeBytes(folder / fmt::format("c{}.png", k),
+                   *encodePng(kWidth, kHeight, 3, 8, rgb.data(), true));
+        writeBytes(folder / fmt::format("d{}.png", k),
+                   *encodePng(kWidth, kHeight, 1, 16, depth.data(), false));
+        frames += fmt::format(
+            "{}{{\"file_path\":\"c{}.png\",\"depth_file_path\":\"d{}.png\",\"time\":{},"
+            "\"camera\":\"a\",\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}}",
+            k ? "," : "", k, k, k * 0.5);
+    }
+    writeText(
+        folder / "transforms.json",
+        fmt::format("{{\"w\":{},\"h\":{},\"fl_x\":60,\"frames\":[{}]}}", kWidth, kHeight, frames));
+    OpenOptions options;
+    options.set.depthBits = 8;
+    Job job;
+    const auto film = folder / "film.mp4";
+    const auto set = openSequence(folder / "transforms.json", options.into(film), job);
+    ASSERT_TRUE(set) << set.error().text();
+    ASSERT_TRUE(saveSequence(**set, film, {}, job));
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+
+    const auto read = openSequence(film, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    double worst = 0;
+    for (int k = 0; k < kFrames; ++k) {
+        const auto bundle = (*read)->frame(static_cast<std::size_t>(k), job);
+        ASSERT_TRUE(bundle) << bundle.error().text();
+        const ReferenceView& view = bundle->views[0];
+        EXPECT_EQ(view.depthBits, 8);
+        for (int i = 0; i < kWidth * kHeight; ++i) {
+            const double off =
+                std::abs(view.depth.pixels()[static_cast<std::size_t>(i)] - depthAt(k, i) / 1000.0);
+            EXPECT_LE(off, view.depthCode().step() / 2 + 1e-6) << "frame " << k << ", pixel " << i;
+            worst = std::max(worst, off);
+        }
+    }
+    // The note's bound is that of all frames.
+    double said = 0;
+    ASSERT_EQ(std::sscanf(notes[0].c_str(), "depth is rounded to 8 bits: at most %lf", &said), 1)
+        << notes[0];
+    EXPECT_NEAR(said, worst, 1e-3 * worst);
 }
 
 TEST(MovingSets, TheMovingRoomHasFourCameras) {

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <memory>
+
+#include "lib/model/atlas.hpp"
+#include "lib/model/sequence.hpp"
+
+namespace stx {
+
+/// The same frames for those who hold points as floats: where floats would round coordinates of
+/// the first frame that is asked for (originFor()), cameras and bounds of all frames count from an
+/// origin near it, which is added to Bundle::origin. It is found in the bounds; where none are
+/// stated, in a box around what the views see between their planes, or around their viewpoints
+/// alone while the planes are not known. Else nothing is changed.
+[[nodiscard]] std::unique_ptr<Sequence> fromOrigin(std::unique_ptr<Sequence> frames);
+
+/// The same of an atlas of one model (objectOf()).
+void countFromOrigin(Atlas& atlas);
+
+}  // namespace stx

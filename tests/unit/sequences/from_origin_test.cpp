@@ -1,0 +1,81 @@
+// Coordinates that floats would round are counted from an origin nearby.
+#include "lib/model/from_origin.hpp"
+
+#include "tests/unit/sequences/moving_views.hpp"
+
+namespace stx {
+namespace {
+
+constexpr glm::dvec3 kFar(5e6, 0, -3e6);
+
+/// The moving views at a distance, with bounds or without.
+std::unique_ptr<Sequence> farViews(glm::dvec3 away, bool bounds) {
+    return changed(std::make_unique<MovingViews>(3), [away, bounds](Bundle& bundle, Job&) {
+        for (ReferenceView& view : bundle.views) view.camera.position += away;
+        if (bounds) bundle.bounds = bundle.computeBounds();
+        return Result<void>();
+    });
+}
+
+/// A film whose tables read their views when they are asked for.
+std::unique_ptr<Sequence> readLater(std::unique_ptr<Sequence> frames) {
+    ViewChange nothing;
+    nothing.change = [](ReferenceView&, Job&) { return Result<void>(); };
+    nothing.takes = {"nothing", 0};
+    return changedByView(std::move(frames), nothing);
+}
+
+void expectCountedFromOrigin(const Bundle& is, const Bundle& was) {
+    EXPECT_NE(is.origin, glm::dvec3(0.0));
+    for (std::size_t i = 0; i < is.views.size(); ++i) {
+        EXPECT_EQ(is.views[i].camera.position + is.origin, was.views[i].camera.position);
+        EXPECT_LT(glm::length(is.views[i].camera.position), 1000);
+    }
+    ASSERT_EQ(is.bounds.has_value(), was.bounds.has_value());
+    if (is.bounds) {
+        EXPECT_LT(glm::length(is.bounds->min + is.origin - was.bounds->min), 1e-6);
+    }
+}
+
+TEST(FromOrigin, CamerasAndBoundsCountFromTheSameInAllFrames) {
+    for (const bool bounds : {false, true}) {
+        for (const bool later : {false, true}) {
+            Job job;
+            auto frames = farViews(kFar, bounds);
+            if (later) frames = readLater(std::move(frames));
+            const auto moved = fromOrigin(std::move(frames));
+            const auto truth = farViews(kFar, bounds);
+            std::optional<glm::dvec3> origin;
+            for (const std::size_t i : {2, 0, 1}) {
+                const auto frame = moved->frame(i, job);
+                ASSERT_TRUE(frame) << frame.error().text();
+                const Bundle was = *truth->frame(i, job);
+                expectCountedFromOrigin(*frame, was);
+                if (!origin) origin = frame->origin;
+                EXPECT_EQ(frame->origin, *origin);
+                const auto table = moved->views(i, job);
+                ASSERT_TRUE(table) << table.error().text();
+                expectCountedFromOrigin(std::as_const(**table).about(), was);
+                EXPECT_EQ(std::as_const(**table).about().origin, *origin);
+                for (std::size_t k = 0; k < was.views.size(); ++k) {
+                    const auto view = (*table)->view(k, job);
+                    ASSERT_TRUE(view) << view.error().text();
+                    EXPECT_EQ((*view)->camera, frame->views[k].camera);
+                    EXPECT_EQ((*view)->depth, was.views[k].depth);
+                }
+            }
+        }
+    }
+}
+
+TEST(FromOrigin, WhatFloatsHoldWellStaysAsItIs) {
+    Job job;
+    const auto moved = fromOrigin(farViews(glm::dvec3(10, 20, 30), false));
+    const Bundle frame = *moved->frame(0, job);
+    EXPECT_EQ(frame.origin, glm::dvec3(0.0));
+    EXPECT_EQ(frame.views[0].camera,
+              farViews(glm::dvec3(10, 20, 30), false)->frame(0, job)->views[0].camera);
+}
+
+}  // namespace
+}  // namespace stx
