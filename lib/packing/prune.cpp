@@ -73,23 +73,34 @@ std::int64_t countKept(const std::vector<PruneView>& views) {
 /// Gives away what others show of a block; `next` is what is kept of the view after it.
 void giveAwayBlock(std::vector<PruneView>& views, PruneView& from, const PruneBlock& block,
                    const PruneSettings& settings, Image<std::uint8_t>& next) {
-    const std::vector<int> partners = partnersOfBlock(views, from, block);
-    if (partners.empty()) return;
+    const BlockPartners partners = partnersOfBlock(views, from, block);
+    if (partners.kept.empty()) return;
+    std::vector<std::pair<int, Replacement>> shown;  // by view
     for (int y = block.y0; y < block.y1; ++y) {
         for (int x = block.x0; x < block.x1; ++x) {
             if (!from.kept.at(x, y) || from.locked[from.places.at(x, y)]) continue;
             const PrunePixel pixel(from, x, y);
-            for (const int j : partners) {
-                PruneView& to = views[j];
-                const Replacement r = findReplacement(from, pixel, to, settings);
+            // Whoever sees past it would outvote the one view that is left to show it.
+            std::ptrdiff_t wanted = 1;
+            shown.clear();
+            for (const int j : partners.kept) {
+                const Replacement r = findReplacement(from, pixel, views[j], settings);
                 if (!r.found) continue;
+                if (shown.empty())
+                    wanted += std::ranges::count_if(
+                        partners.empty, [&](int k) { return seesPast(views[k], pixel); });
+                shown.emplace_back(j, r);
+                if (std::ssize(shown) == wanted) break;
+            }
+            if (std::ssize(shown) < wanted) continue;
+            for (const auto& [j, r] : shown) {
+                PruneView& to = views[j];
                 for (int c = 0; c < 4; ++c)
                     std::atomic_ref(to.locked[to.places.at(r.x + (c & 1), r.y + (c >> 1))])
                         .store(1, std::memory_order_relaxed);
-                next.at(x, y) = 0;
-                from.errors[from.places.at(x, y)] = static_cast<float>(r.error);
-                break;
             }
+            next.at(x, y) = 0;
+            from.errors[from.places.at(x, y)] = static_cast<float>(shown.front().second.error);
         }
     }
 }

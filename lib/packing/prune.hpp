@@ -40,8 +40,9 @@ struct PruneReport {
 /// Takes away pixels that other views show as well or better. Which view keeps a piece of surface:
 /// views are ranked by what they add to the coverage of the object, and a pixel goes when all four
 /// pixels around its place in a view of higher rank are kept, show the same surface, sample it at a
-/// finer or equal rate and agree in colour; or when a view of lower rank shows it finer. What
-/// replaces a pixel is kept for good, so no hole can open.
+/// finer or equal rate and agree in colour; or when a view of lower rank shows it finer. Where
+/// views have background at its place, one view more than these must show it so. What replaces a
+/// pixel is kept for good, so no hole can open.
 ///
 /// A pixel taken away has no depth but full alpha: "the object is here, another view gives its
 /// distance". Renderers take no empty space from it. So are the background pixels beside pruned
