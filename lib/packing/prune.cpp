@@ -9,6 +9,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/model/views_over.hpp"
+#include "lib/packing/layout.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/redundancy.hpp"
 #include "lib/packing/views_one_by_one.hpp"
@@ -272,13 +273,18 @@ void keepOnly(const Image<std::uint8_t>& kept, ReferenceView& view) {
     if (!any) return;
     view.pruned = true;
     if (lacksDepthByMask(view)) view.noDepth = NoDepth::empty;
+    // Kept, or a colour that was never measured: what is around such ones tells where they are.
+    const auto stays = [&](int x, int y) {
+        return kept.at(x, y) != 0 ||
+               (view.noDepth == NoDepth::unknown && !gone.at(x, y) && view.texture.at(x, y).a >= 1);
+    };
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
-            if (!kept.at(x, y)) continue;
+            if (!stays(x, y)) continue;
             // Only the rim of a kept region reaches out.
             const bool inner = x > 0 && y > 0 && x + 1 < width && y + 1 < height &&
-                               kept.at(x - 1, y) && kept.at(x + 1, y) && kept.at(x, y - 1) &&
-                               kept.at(x, y + 1);
+                               stays(x - 1, y) && stays(x + 1, y) && stays(x, y - 1) &&
+                               stays(x, y + 1);
             if (inner) continue;
             for (int ny = std::max(0, y - kColourBand); ny <= std::min(height - 1, y + kColourBand);
                  ++ny) {
@@ -428,7 +434,7 @@ Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& setting
     Pruning out;
     PruneReport& report = out.report;
     std::vector<PruneView> views(table.count());
-    std::vector<std::int64_t> points(table.count());
+    std::vector<std::int64_t> points(table.count()), unmeasured(table.count());
     out.noDepth.resize(table.count());
     STX_CHECK(forEachView(
         table, kPreparing, job,
@@ -436,9 +442,12 @@ Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& setting
             views[i] = preparePruning(*view);
             points[i] = view->pointCount();
             out.noDepth[i] = lacksDepthByMask(*view) ? NoDepth::empty : view->noDepth;
+            if (out.noDepth[i] == NoDepth::unknown && !view->pruned && !view->background)
+                unmeasured[i] = objectPixels(*view) - points[i];
             return {};
         }));
     for (const std::int64_t n : points) report.sourcePixels += n;
+    for (const std::int64_t n : unmeasured) report.unmeasuredPixels += n;
     const std::vector<int> rank = rankViews(views, report.sourcePixels);
     for (PruneView& v : views) {
         // In their room: what is freed between the views is seldom given back.

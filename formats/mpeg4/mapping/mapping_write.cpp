@@ -390,6 +390,7 @@ class SceneWriter {
         }
         clamped_ = clamped_ || images.clamped;
         coverageLost_ = coverageLost_ || images.coverageLost;
+        unmeasuredLost_ = unmeasuredLost_ || images.unmeasuredLost;
         dropped_ = dropped_ || (!isV2(view) && (view.hasNormals() || view.hasSplats()));
     }
     void sayTotals() {
@@ -405,6 +406,10 @@ class SceneWriter {
         if (coverageLost_)
             job_.note(fmt::format("{} has no alpha: soft edges of the coverage are lost",
                                   options_.pointTexture ? "a PointTexture" : "JPEG"));
+        if (unmeasuredLost_)
+            job_.note(
+                "a PointTexture has points only: colours without a depth are lost; a DepthImage "
+                "keeps them");
         if (dropped_) job_.note("SimpleTexture (V1) has no normals and splats: they are left out");
     }
 
@@ -418,7 +423,8 @@ class SceneWriter {
     std::set<std::string> taken_;
     double worst_ = 0;
     int lossyBits_ = 0;
-    bool clamped_ = false, coverageLost_ = false, dropped_ = false, vectorsLost_ = false;
+    bool clamped_ = false, coverageLost_ = false, dropped_ = false, vectorsLost_ = false,
+         unmeasuredLost_ = false;
 };
 
 }  // namespace
