@@ -187,6 +187,12 @@ Result<std::optional<PrunedTo>> pruneViews(const PackOptions& o, const std::stri
     };
     STX_TRY(auto pruning, within(fmt::format("'{}'", input), found()));
     const PrunedTo pruned{pruning.report, o.minPsnr > 0};
+    const std::int64_t unmeasured = pruning.report.unmeasuredPixels;
+    if (unmeasured > 0 && o.settings.layout == PackSettings::Layout::tight)
+        job.note(
+            fmt::format("'{}': of {} pixels that have colours but no depth, the tight layout keeps "
+                        "only those amid others; --layout grid keeps all",
+                        input, unmeasured));
     views = prunedViews(std::move(views), std::move(pruning));
     return pruned;
 }

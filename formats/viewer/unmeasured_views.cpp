@@ -15,6 +15,7 @@ std::optional<ReferenceView> layerOf(const ReferenceView& captured, const Image<
     ReferenceView out;
     static_cast<ViewHeader&>(out) = captured;
     out.noDepth = NoDepth::unknown;
+    out.pruned = false;
     out.depthBits = 16;
     out.refined = {};
     out.colourFile = {};

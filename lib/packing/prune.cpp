@@ -9,6 +9,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/model/views_over.hpp"
+#include "lib/packing/layout.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/redundancy.hpp"
 #include "lib/packing/views_one_by_one.hpp"
@@ -73,23 +74,34 @@ std::int64_t countKept(const std::vector<PruneView>& views) {
 /// Gives away what others show of a block; `next` is what is kept of the view after it.
 void giveAwayBlock(std::vector<PruneView>& views, PruneView& from, const PruneBlock& block,
                    const PruneSettings& settings, Image<std::uint8_t>& next) {
-    const std::vector<int> partners = partnersOfBlock(views, from, block);
-    if (partners.empty()) return;
+    const BlockPartners partners = partnersOfBlock(views, from, block);
+    if (partners.kept.empty()) return;
+    std::vector<std::pair<int, Replacement>> shown;  // by view
     for (int y = block.y0; y < block.y1; ++y) {
         for (int x = block.x0; x < block.x1; ++x) {
             if (!from.kept.at(x, y) || from.locked[from.places.at(x, y)]) continue;
             const PrunePixel pixel(from, x, y);
-            for (const int j : partners) {
-                PruneView& to = views[j];
-                const Replacement r = findReplacement(from, pixel, to, settings);
+            // Whoever sees past it would outvote the one view that is left to show it.
+            std::ptrdiff_t wanted = 1;
+            shown.clear();
+            for (const int j : partners.kept) {
+                const Replacement r = findReplacement(from, pixel, views[j], settings);
                 if (!r.found) continue;
+                if (shown.empty())
+                    wanted += std::ranges::count_if(
+                        partners.empty, [&](int k) { return seesPast(views[k], pixel); });
+                shown.emplace_back(j, r);
+                if (std::ssize(shown) == wanted) break;
+            }
+            if (std::ssize(shown) < wanted) continue;
+            for (const auto& [j, r] : shown) {
+                PruneView& to = views[j];
                 for (int c = 0; c < 4; ++c)
                     std::atomic_ref(to.locked[to.places.at(r.x + (c & 1), r.y + (c >> 1))])
                         .store(1, std::memory_order_relaxed);
-                next.at(x, y) = 0;
-                from.errors[from.places.at(x, y)] = static_cast<float>(r.error);
-                break;
             }
+            next.at(x, y) = 0;
+            from.errors[from.places.at(x, y)] = static_cast<float>(shown.front().second.error);
         }
     }
 }
@@ -261,13 +273,18 @@ void keepOnly(const Image<std::uint8_t>& kept, ReferenceView& view) {
     if (!any) return;
     view.pruned = true;
     if (lacksDepthByMask(view)) view.noDepth = NoDepth::empty;
+    // Kept, or a colour that was never measured: what is around such ones tells where they are.
+    const auto stays = [&](int x, int y) {
+        return kept.at(x, y) != 0 ||
+               (view.noDepth == NoDepth::unknown && !gone.at(x, y) && view.texture.at(x, y).a >= 1);
+    };
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
-            if (!kept.at(x, y)) continue;
+            if (!stays(x, y)) continue;
             // Only the rim of a kept region reaches out.
             const bool inner = x > 0 && y > 0 && x + 1 < width && y + 1 < height &&
-                               kept.at(x - 1, y) && kept.at(x + 1, y) && kept.at(x, y - 1) &&
-                               kept.at(x, y + 1);
+                               stays(x - 1, y) && stays(x + 1, y) && stays(x, y - 1) &&
+                               stays(x, y + 1);
             if (inner) continue;
             for (int ny = std::max(0, y - kColourBand); ny <= std::min(height - 1, y + kColourBand);
                  ++ny) {
@@ -417,7 +434,7 @@ Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& setting
     Pruning out;
     PruneReport& report = out.report;
     std::vector<PruneView> views(table.count());
-    std::vector<std::int64_t> points(table.count());
+    std::vector<std::int64_t> points(table.count()), unmeasured(table.count());
     out.noDepth.resize(table.count());
     STX_CHECK(forEachView(
         table, kPreparing, job,
@@ -425,9 +442,12 @@ Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& setting
             views[i] = preparePruning(*view);
             points[i] = view->pointCount();
             out.noDepth[i] = lacksDepthByMask(*view) ? NoDepth::empty : view->noDepth;
+            if (out.noDepth[i] == NoDepth::unknown && !view->pruned && !view->background)
+                unmeasured[i] = objectPixels(*view) - points[i];
             return {};
         }));
     for (const std::int64_t n : points) report.sourcePixels += n;
+    for (const std::int64_t n : unmeasured) report.unmeasuredPixels += n;
     const std::vector<int> rank = rankViews(views, report.sourcePixels);
     for (PruneView& v : views) {
         // In their room: what is freed between the views is seldom given back.

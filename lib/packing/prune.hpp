@@ -35,19 +35,23 @@ struct PruneReport {
     std::int64_t keptPixels = 0;    ///< and after
     double psnr = 0;                ///< estimate, dB; infinity when nothing was lost
     int emptiedViews = 0;           ///< views without a pixel left
+    /// Pixels that have colours but no depth, of views that fill their frames: prune() keeps them.
+    std::int64_t unmeasuredPixels = 0;
 };
 
 /// Takes away pixels that other views show as well or better. Which view keeps a piece of surface:
 /// views are ranked by what they add to the coverage of the object, and a pixel goes when all four
 /// pixels around its place in a view of higher rank are kept, show the same surface, sample it at a
-/// finer or equal rate and agree in colour; or when a view of lower rank shows it finer. What
-/// replaces a pixel is kept for good, so no hole can open.
+/// finer or equal rate and agree in colour; or when a view of lower rank shows it finer. Where
+/// views have background at its place, one view more than these must show it so. What replaces a
+/// pixel is kept for good, so no hole can open.
 ///
 /// A pixel taken away has no depth but full alpha: "the object is here, another view gives its
 /// distance". Renderers take no empty space from it. So are the background pixels beside pruned
-/// silhouettes. It keeps its colour next to kept pixels, for filters; farther off the colours are
-/// smooth. A view with NoDepth::unknown becomes NoDepth::empty where lacksDepthByMask(): where an
-/// atlas keeps nothing of it is then empty or pruned.
+/// silhouettes. It keeps its colour next to kept pixels, for filters, and next to colours that were
+/// never measured (NoDepth::unknown), which all stay; farther off the colours are smooth. A view
+/// with NoDepth::unknown becomes NoDepth::empty where lacksDepthByMask(): where an atlas keeps
+/// nothing of it is then empty or pruned.
 ///
 /// Errors: settings out of range; a bundle that fails check(); a budget below what can be kept
 /// without a hole, with that number; cancelled. A pruned bundle gives the same bytes on any number

@@ -74,6 +74,42 @@ double rateAt(const PruneView& p, int x, int y, const PruneView::Surfel& s) {
     return area > 0 ? 1.0 / area : 0.0;
 }
 
+/// Whether most of what a view shows around a point of space is empty.
+bool isEmptyAt(const PruneView& view, const glm::dvec3& world) {
+    const Camera& camera = view.camera;
+    const glm::dvec3 inCamera = view.cameraFromWorld * (world - camera.position);
+    if (!camera.orthographic && !(inCamera.z < 0)) return false;
+    const glm::dvec3 pixel = camera.project(inCamera);
+    if (!(pixel.x >= 0 && pixel.y >= 0 && pixel.x < camera.width && pixel.y < camera.height))
+        return false;
+    const double fx = std::clamp(pixel.x - 0.5, 0.0, camera.width - 1.0),
+                 fy = std::clamp(pixel.y - 0.5, 0.0, camera.height - 1.0);
+    const int x0 = static_cast<int>(fx), y0 = static_cast<int>(fy);
+    double empty = 0;
+    for (int k = 0; k < 4; ++k) {
+        const int x = std::min(x0 + (k & 1), camera.width - 1),
+                  y = std::min(y0 + (k >> 1), camera.height - 1);
+        if (!view.empty[static_cast<std::size_t>(y) * view.kept.width() + x]) continue;
+        empty += (k & 1 ? fx - x0 : 1 - (fx - x0)) * (k >> 1 ? fy - y0 : 1 - (fy - y0));
+    }
+    return empty > 0.5;
+}
+
+/// Of each block of BlockPlaces::kSide of a picture, row by row: whether `has` holds of a pixel.
+template <class Has>
+std::vector<std::uint8_t> blocksWith(const Image<std::uint8_t>& picture, const Has& has) {
+    constexpr int side = BlockPlaces::kSide;
+    const int columns = (picture.width() + side - 1) / side,
+              rows = (picture.height() + side - 1) / side;
+    std::vector<std::uint8_t> blocks(static_cast<std::size_t>(columns) * rows, 0);
+    std::size_t k = 0;
+    for (int y = 0; y < picture.height(); ++y) {
+        for (int x = 0; x < picture.width(); ++x, ++k)
+            if (has(k)) blocks[static_cast<std::size_t>(y / side) * columns + x / side] = 1;
+    }
+    return blocks;
+}
+
 }  // namespace
 
 BlockPlaces::BlockPlaces(const Image<std::uint8_t>& wanted) {
@@ -112,14 +148,7 @@ void PruneView::keepAll() {
 }
 
 void PruneView::findLiveBlocks() {
-    constexpr int side = BlockPlaces::kSide;
-    const int columns = (kept.width() + side - 1) / side, rows = (kept.height() + side - 1) / side;
-    liveBlocks.assign(static_cast<std::size_t>(columns) * rows, 0);
-    for (int y = 0; y < kept.height(); ++y) {
-        for (int x = 0; x < kept.width(); ++x)
-            if (kept.at(x, y))
-                liveBlocks[static_cast<std::size_t>(y / side) * columns + x / side] = 1;
-    }
+    liveBlocks = blocksWith(kept, [&](std::size_t k) { return kept.data()[k] != 0; });
 }
 
 namespace {
@@ -149,8 +178,9 @@ std::optional<Corners> cornersOf(const PruneView& view, const PruneBlock& block)
     return corners;
 }
 
-/// Whether something between the corners may fall on kept pixels of a view.
-bool mayFallOnKept(const PruneView& to, const Corners& corners) {
+/// Whether something between the corners may fall on blocks of a view that are marked.
+bool mayFallOn(const std::vector<std::uint8_t>& blocks, const PruneView& to,
+               const Corners& corners) {
     constexpr int side = BlockPlaces::kSide;
     const Camera& camera = to.camera;
     glm::dvec2 low(std::numeric_limits<double>::max()), high(-low);
@@ -168,19 +198,21 @@ bool mayFallOnKept(const PruneView& to, const Corners& corners) {
     const int columns = (camera.width + side - 1) / side;
     for (int y = first.y / side; y <= end.y / side; ++y)
         for (int x = first.x / side; x <= end.x / side; ++x)
-            if (to.liveBlocks[static_cast<std::size_t>(y) * columns + x]) return true;
+            if (blocks[static_cast<std::size_t>(y) * columns + x]) return true;
     return false;
 }
 
 }  // namespace
 
-std::vector<int> partnersOfBlock(const std::vector<PruneView>& views, const PruneView& from,
-                                 const PruneBlock& block) {
-    std::vector<int> out;
+BlockPartners partnersOfBlock(const std::vector<PruneView>& views, const PruneView& from,
+                              const PruneBlock& block) {
+    BlockPartners out;
     const auto corners = cornersOf(from, block);
     if (!corners) return out;
-    for (const int j : from.partners)
-        if (mayFallOnKept(views[j], *corners)) out.push_back(j);
+    for (const int j : from.partners) {
+        if (mayFallOn(views[j].liveBlocks, views[j], *corners)) out.kept.push_back(j);
+        if (mayFallOn(views[j].emptyBlocks, views[j], *corners)) out.empty.push_back(j);
+    }
     return out;
 }
 
@@ -199,6 +231,10 @@ PruneView preparePruning(const ReferenceView& view) {
         p.points[k] = !std::isnan(surface.w.pixels()[k]);
         p.kept.pixels()[k] = p.points[k] ? 1 : 0;
     }
+    p.empty.resize(p.kept.count());
+    for (std::size_t k = 0; k < p.kept.count(); ++k)
+        p.empty[k] = !p.points[k] && view.texture.alpha(k) < 0.5f;
+    p.emptyBlocks = blocksWith(p.kept, [&](std::size_t k) { return p.empty[k]; });
     keepPoints(view, surface, p);
     findBounds(view, p);
     return p;
@@ -243,6 +279,13 @@ PrunePixel::PrunePixel(const PruneView& view, int x, int y) {
         normal = view.worldFromCamera * (across * rate);
     }
     colour = view.colour(view.places.at(x, y));
+}
+
+bool seesPast(const PruneView& view, const PrunePixel& pixel) {
+    if (!isEmptyAt(view, pixel.world)) return false;
+    const Camera& camera = view.camera;
+    const double z = -(view.cameraFromWorld * (pixel.world - camera.position)).z;
+    return isEmptyAt(view, pixel.world - pixel.normal * camera.sampleSpacing(z).x);
 }
 
 Replacement findReplacement(const PruneView& from, const PrunePixel& source, const PruneView& to,

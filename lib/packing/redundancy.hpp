@@ -46,6 +46,7 @@ struct PruneView {
     std::vector<int> partners;  ///< views that may show the same surface, best rank first
     Image<std::uint8_t> kept;   ///< 1 = a point that is still here
     std::vector<bool> points;   ///< of each pixel, row by row
+    std::vector<bool> empty;    ///< the same: mostly background, alpha below one half
 
     BlockPlaces places;  ///< of its points; by them:
     struct Surfel {
@@ -71,6 +72,7 @@ struct PruneView {
     }
     /// Of each block of BlockPlaces::kSide, row by row: whether something of it is kept.
     std::vector<std::uint8_t> liveBlocks;
+    std::vector<std::uint8_t> emptyBlocks;  ///< the same of `empty`
 
     /// The depth of the view, of `depths`.
     [[nodiscard]] Image<float> depth() const;
@@ -84,9 +86,13 @@ struct PruneView {
 struct PruneBlock {
     int x0, y0, x1, y1;
 };
-/// The partners of a view in whose pictures kept pixels of a block may fall on kept ones.
-[[nodiscard]] std::vector<int> partnersOfBlock(const std::vector<PruneView>& views,
-                                               const PruneView& from, const PruneBlock& block);
+/// Partners of a view in whose pictures kept pixels of a block may fall
+struct BlockPartners {
+    std::vector<int> kept;   ///< on kept pixels, best rank first
+    std::vector<int> empty;  ///< on empty ones
+};
+[[nodiscard]] BlockPartners partnersOfBlock(const std::vector<PruneView>& views,
+                                            const PruneView& from, const PruneBlock& block);
 
 /// Where a pixel's surface is found in another view.
 struct Replacement {
@@ -111,6 +117,11 @@ struct PrunePixel {
     double rate = 0;         ///< samples per area of its surface
     glm::vec3 colour{0.0f};
 };
+
+/// Whether a view sees background where the surface of a pixel is, and a pixel of the view behind
+/// it, too: its outline is known to a part of a pixel only, and beside that surfaces are seen edge
+/// on. Renderers leave a point out when more views see past it than show it.
+[[nodiscard]] bool seesPast(const PruneView& view, const PrunePixel& pixel);
 
 /// Looks for a pixel of `from` in view `to`. A sheet that both see from opposite sides is two
 /// surfaces.

@@ -199,11 +199,39 @@ constexpr Repair kRepairs[] = {
     {RefineStep::gaps, closeDepthGaps},
     {RefineStep::align, alignDepthEdges}};
 
+/// What pruning took is neither a gap nor a depth edge: other views show it. Pixels of a pruned
+/// view that have no depth, and those as near to them as the steps look at one by one, get theirs
+/// back.
+std::int64_t keepAsPruned(const RefineView& view, Image<float>& now) {
+    constexpr int kLookedAt = 2;  // pixels to each side: as dropMixedPixels()
+    const Image<float>& was = *view.depth;
+    std::int64_t changed = 0;
+    const auto isBesidePruned = [&](int x, int y) {
+        for (int j = std::max(y - kLookedAt, 0); j <= std::min(y + kLookedAt, was.height() - 1);
+             ++j)
+            for (int i = std::max(x - kLookedAt, 0); i <= std::min(x + kLookedAt, was.width() - 1);
+                 ++i)
+                if (!hasPoint(was.at(i, j)) && view.texture->at(i, j).a >= 1.0f) return true;
+        return false;
+    };
+    for (int y = 0; y < was.height(); ++y) {
+        for (int x = 0; x < was.width(); ++x) {
+            if (now.at(x, y) == was.at(x, y)) continue;
+            if (isBesidePruned(x, y))
+                now.at(x, y) = was.at(x, y);
+            else
+                ++changed;
+        }
+    }
+    return changed;
+}
+
 /// Does one of them; the view gets new distances, kept in `distances`. Gives what it changed.
 RefineStepReport repair(const Repair& step, RefineView& view, Image<float>& distances) {
     RefineStepReport report;
     Image<float> now = *view.depth;
     report.pixels = step.run(now, *view.texture);
+    if (view.header->pruned) report.pixels = keepAsPruned(view, now);
     report.views = report.pixels > 0;
     for (std::size_t i = 0; i < now.count(); ++i) {
         const float was = view.depth->data()[i], is = now.data()[i];

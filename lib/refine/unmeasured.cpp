@@ -12,6 +12,7 @@
 #include "lib/geometry/near_views.hpp"
 #include "lib/geometry/pixel_space.hpp"
 #include "lib/refine/local_plane.hpp"
+#include "lib/refine/reproject.hpp"
 
 namespace stx {
 namespace {
@@ -22,6 +23,8 @@ namespace {
 constexpr double kFarTimes = 1000.0;
 /// Views that a view is compared with.
 constexpr std::size_t kComparedViews = 4;
+/// Views that may show what pruning took from a view: as many as prune() asks.
+constexpr std::size_t kPrunedByViews = 24;
 /// Colours are compared in a window of so many samples a side, so many pixels apart.
 constexpr int kSamplesASide = 3, kSampleStep = 3;
 /// Samples of another colour than the middle's count less: a difference by which they count 1 / e.
@@ -306,6 +309,44 @@ void lookAt(const RefineView& view, Looked& l) {
     l.colours = &*l.coded;
 }
 
+/// What pruning took from a perspective view is measured: others show it. Distances by these.
+Image<float> distancesByOthers(std::span<const RefineView> views, std::size_t k) {
+    const ViewHeader& header = *views[k].header;
+    const Camera& camera = header.camera;
+    const auto cameraOf = [&](std::size_t i) -> const Camera& { return views[i].header->camera; };
+    const double middle = 0.5 * (header.nearPlane + header.farPlane);
+    Image<float> nearest(camera.width, camera.height, kNoDepth);
+    Job job;
+    for (const std::size_t i :
+         nearViews(views.size(), cameraOf, k, camera.position + middle * camera.forward(),
+                   kPrunedByViews)) {
+        if (views[i].header->background) continue;
+        const auto seen = depthSeenBy(camera, {}, *views[i].depth, cameraOf(i), job);
+        for (std::size_t p = 0; seen && p < nearest.count(); ++p)
+            nearest.data()[p] = std::min(nearest.data()[p], seen->data()[p]);
+    }
+    return nearest;
+}
+
+/// Takes that in; only what nobody measured is wanted then. Faces of other views reach half a pixel
+/// beyond what they measured, so that pixels beside what is left stay, too.
+void takePruned(const Image<float>& others, Looked& l) {
+    Image<std::uint8_t> left(others.width(), others.height(), std::uint8_t{0});
+    bool any = false;
+    for (int y = 0; y < others.height(); ++y) {
+        for (int x = 0; x < others.width(); ++x) {
+            if (!l.wanted.at(x, y) || hasPoint(others.at(x, y))) continue;
+            any = true;
+            for (int j = std::max(y - 1, 0); j <= std::min(y + 1, left.height() - 1); ++j)
+                for (int i = std::max(x - 1, 0); i <= std::min(x + 1, left.width() - 1); ++i)
+                    left.at(i, j) = l.wanted.at(i, j);
+        }
+    }
+    for (std::size_t i = 0; i < others.count(); ++i)
+        if (l.wanted.data()[i] && !left.data()[i]) l.q.data()[i] = 1.0f / others.data()[i];
+    l.wanted = any ? std::move(left) : Image<std::uint8_t>();
+}
+
 /// Depth of the pixels that are wanted of 1/distance, with measured depth around them.
 Image<float> withRing(const Looked& l, const Image<float>& q, const Image<float>& measured) {
     Image<float> depth(q.width(), q.height(), kNoDepth);
@@ -315,7 +356,9 @@ Image<float> withRing(const Looked& l, const Image<float>& q, const Image<float>
             depth.at(x, y) = 1.0f / q.at(x, y);
             for (int j = std::max(y - kRing, 0); j <= std::min(y + kRing, q.height() - 1); ++j)
                 for (int i = std::max(x - kRing, 0); i <= std::min(x + kRing, q.width() - 1); ++i)
-                    if (l.q.at(i, j) > 0.0f) depth.at(i, j) = measured.at(i, j);
+                    if (l.q.at(i, j) > 0.0f)
+                        depth.at(i, j) =
+                            hasPoint(measured.at(i, j)) ? measured.at(i, j) : 1.0f / l.q.at(i, j);
         }
     }
     return depth;
@@ -338,6 +381,10 @@ UnmeasuredDepth unmeasuredDepth(std::span<const RefineView> views,
     if (std::ranges::all_of(looked, [](const Looked& l) { return l.wanted.empty(); })) return out;
     ofEach([&](std::size_t k) {
         if (!views[k].header->camera.orthographic) lookAt(views[k], looked[k]);
+    });
+    ofEach([&](std::size_t k) {
+        if (views[k].header->pruned && !looked[k].wanted.empty())
+            takePruned(distancesByOthers(views, k), looked[k]);
     });
     for (const Looked& l : looked) out.farAway = std::max(out.farAway, kFarTimes * l.farthest);
     if (!(out.farAway > 0)) return out;

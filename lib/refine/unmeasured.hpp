@@ -21,7 +21,7 @@ struct UnmeasuredDepth {
 
 /// Whether a view may have such pixels. Its own are not looked at.
 [[nodiscard]] inline bool mayHaveUnmeasured(const ViewHeader& view) {
-    return view.noDepth == NoDepth::unknown && !view.pruned && !view.background;
+    return view.noDepth == NoDepth::unknown && !view.background;
 }
 
 /// Gives pixels of full alpha without depth the planes of the points around them, spread from pixel
@@ -29,7 +29,8 @@ struct UnmeasuredDepth {
 /// where other views show the same colours there, and nothing that they measured is before or
 /// behind it; where they do not tell, where no edge of the picture is on the way. The others are
 /// far away. Of perspective views with `wanted` and full alpha everywhere; all views are compared
-/// with. The same on any number of threads.
+/// with. What pruning took from a view, which others show, is not among them. The same
+/// on any number of threads.
 [[nodiscard]] UnmeasuredDepth unmeasuredDepth(std::span<const RefineView> views,
                                               const std::vector<bool>& wanted);
 

@@ -384,6 +384,7 @@ class SceneWriter {
             .add(view, bitsOf(view), images.worstDepth);
         clamped_ = clamped_ || images.clamped;
         coverageLost_ = coverageLost_ || images.coverageLost;
+        unmeasuredLost_ = unmeasuredLost_ || images.unmeasuredLost;
         dropped_ = dropped_ || (!isV2(view) && (view.hasNormals() || view.hasSplats()));
     }
     void sayTotals() {
@@ -397,6 +398,10 @@ class SceneWriter {
         if (coverageLost_)
             job_.note(fmt::format("{} has no alpha: soft edges of the coverage are lost",
                                   options_.pointTexture ? "a PointTexture" : "JPEG"));
+        if (unmeasuredLost_)
+            job_.note(
+                "a PointTexture has points only: colours without a depth are lost; a DepthImage "
+                "keeps them");
         if (dropped_) job_.note("SimpleTexture (V1) has no normals and splats: they are left out");
     }
 
@@ -409,7 +414,8 @@ class SceneWriter {
     Bounds bounds_;
     std::set<std::string> taken_;
     DepthLoss depthLoss_;
-    bool clamped_ = false, coverageLost_ = false, dropped_ = false, vectorsLost_ = false;
+    bool clamped_ = false, coverageLost_ = false, dropped_ = false, vectorsLost_ = false,
+         unmeasuredLost_ = false;
 };
 
 }  // namespace

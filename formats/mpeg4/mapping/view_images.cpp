@@ -85,6 +85,10 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
         const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
         out.coverageLost = !alphaFollowsDepth(colour, view.depth, mayBeUnknown);
         if (mayBeUnknown) STX_SET(out.unknown, unknownMask(colour, view.depth));
+        // Other views show what was pruned.
+        if (view.noDepth == NoDepth::unknown && !view.pruned)
+            for (std::size_t i = 0; i < colour.count() && !out.unmeasuredLost; ++i)
+                out.unmeasuredLost = !hasPoint(view.depth.data()[i]) && colour.data()[i].a == 255;
         return out;
     }
     STX_TRY(out.depth, depthPng(view.depth, code, out.padding, out.worstDepth));

@@ -16,6 +16,7 @@ struct ViewImages {
     std::string unknown;    ///< where its depth is unknown, if that can be: what its note says
     double worstDepth = 0;  ///< largest error of the depth's code, scene units
     bool clamped = false;   ///< linear colour above 1 was cut
+    bool unmeasuredLost = false;  ///< colours without a depth
     bool coverageLost = false;
 };
 

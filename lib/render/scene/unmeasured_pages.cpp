@@ -20,6 +20,7 @@ PageSet PageSet::withUnmeasured(const PageSet& captured, std::int64_t& pixels) c
     if (pixels == 0) return *this;
     auto data = std::make_shared<Data>(*data_);
     data->bounds = {};
+    data->pruned = false;
     data->farAway = found.farAway;
     std::vector<std::shared_ptr<Image<float>>> depths(data->pages.size());
     std::vector<bool> kept;
@@ -28,6 +29,7 @@ PageSet PageSet::withUnmeasured(const PageSet& captured, std::int64_t& pixels) c
         if (!kept[i]) continue;
         PageView& view = data->views[i];
         view.noDepth = NoDepth::unknown;
+        view.pruned = false;
         view.depthBits = 32;
         view.refined = {};
         view.hasNormals = view.hasSplats = false;

@@ -50,6 +50,32 @@ TEST(Prune, LeavesNoHoleAndHardlyADifference) {
     }
 }
 
+TEST(Prune, WhatOneViewMissesStaysClosedInOthers) {
+    // A sensor that misses a square in each view, elsewhere each time: background, by its alpha.
+    // Those that show the place outvote it before pruning.
+    Bundle before = torusViews(128, glm::dvec3(0.0), {ViewLayout::Kind::sphere, 40, 0});
+    for (std::size_t i = 0; i < before.views.size(); ++i) {
+        ReferenceView& view = before.views[i];
+        const int x0 = 40 + static_cast<int>(i * 29 % 37), y0 = 45 + static_cast<int>(i * 17 % 31);
+        for (int y = y0; y < y0 + 12; ++y) {
+            for (int x = x0; x < x0 + 12; ++x) {
+                view.depth.at(x, y) = kNoDepth;
+                view.texture.rgba8()->at(x, y).a = 0;
+            }
+        }
+    }
+    Bundle after = before;
+    Job job;
+    const auto report = prune(after, {}, job);
+    ASSERT_TRUE(report) << report.error().text();
+    EXPECT_LT(report->keptPixels, report->sourcePixels / 2);
+    for (const glm::dvec3 eye :
+         {glm::dvec3(1, 2, 2), glm::dvec3(-2, 1, 2), glm::dvec3(0.5, -2.6, 1)}) {
+        const Camera camera = analytic::lookingAt(eye, 192);
+        EXPECT_EQ(holes(draw(before, camera), draw(after, camera)), 0);
+    }
+}
+
 TEST(Prune, ASheetSeenFromBothSidesIsTwoSurfaces) {
     // A sheet without thickness, half a view apart to each side: neither view shows the other's.
     Mesh mesh;

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/packing/packing.hpp"
+#include "lib/packing/prune.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "tests/noisy_depth.hpp"
@@ -269,6 +270,36 @@ TEST(Refine, PointsThatWereDroppedAreNotSeenThrough) {
     EXPECT_EQ(view.depth.at(41, 40), beside);
     EXPECT_EQ(view.noDepth, NoDepth::unknown);
     EXPECT_EQ(view.refined.steps, "mixed");
+}
+
+TEST(Refine, WhatWasPrunedIsNotMissing) {
+    Bundle pruned = room();
+    Job job;
+    const auto pruning = prune(pruned, {}, job);
+    ASSERT_TRUE(pruning) << pruning.error().text();
+    ASSERT_LT(pruning->keptPixels, pruning->sourcePixels);
+    // Alone amid what was pruned: it is no speck of dust.
+    ReferenceView& view = pruned.views[0];
+    for (int y = 38; y <= 42; ++y)
+        for (int x = 38; x <= 42; ++x)
+            if (x != 40 || y != 40) view.depth.at(x, y) = kNoDepth;
+    view.depth.at(40, 40) = room().views[0].depth.at(40, 40);
+    view.pruned = true;
+    for (const char* step : {"gaps", "mixed"}) {
+        Bundle refined = pruned, whole = room();
+        const auto only = RefineSettings::from(step);
+        ASSERT_TRUE(only);
+        ASSERT_TRUE(refine(refined, *only, job));
+        ASSERT_TRUE(refine(whole, *only, job));
+        // Only what changes in whole views does: some pixels of a room hang between its walls.
+        const Bundle exact = room();
+        for (std::size_t v = 0; v < exact.views.size(); ++v)
+            for (std::size_t i = 0; i < exact.views[v].depth.count(); ++i)
+                if (whole.views[v].depth.data()[i] == exact.views[v].depth.data()[i]) {
+                    ASSERT_EQ(refined.views[v].depth.data()[i], pruned.views[v].depth.data()[i])
+                        << step << ", view " << v << ", pixel " << i;
+                }
+    }
 }
 
 TEST(Refine, SettingsAreNamesOfSteps) {

@@ -112,7 +112,9 @@ TEST(CoarsePages, AreLeftOutOfAtlases) {
     Job job;
     Bundle mixed = fineViews();
     mixed.views.push_back(viewOf(2.2, 12));
-    const auto atlas = pack(mixed, {.layout = PackSettings::Layout::tight}, job);
+    PackSettings tight;
+    tight.layout = PackSettings::Layout::tight;
+    const auto atlas = pack(mixed, tight, job);
     ASSERT_TRUE(atlas);
     const auto set = PageSet::of(*atlas, job);
     ASSERT_TRUE(set);

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lib/packing/prune.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/factory.hpp"
 
@@ -152,6 +153,24 @@ TEST(Unmeasured, ASkyIsDrawnThroughTheWindow) {
             withDepth += hasPoint(with.depth.data()[i]);
         }
         EXPECT_LT(withDepth, count / 5);
+    }
+}
+
+TEST(Unmeasured, ASkyIsDrawnOfPrunedViews) {
+    const Camera camera = wallCamera(0.04);
+    const ReferenceView truth = wallWithWindow(camera, NoDepth::unknown);
+    const auto sky = [&](std::size_t i) { return !hasPoint(truth.depth.data()[i]); };
+    const auto all = [](std::size_t) { return true; };
+    Bundle pruned = walls();
+    Job job;
+    const auto report = prune(pruned, {}, job);
+    ASSERT_TRUE(report) << report.error().text();
+    ASSERT_LT(report->keptPixels, report->sourcePixels / 2);
+    for (const RenderMode mode : {RenderMode::surface, RenderMode::splat}) {
+        const Frame whole = drawn(walls(), camera, mode, true),
+                    frame = drawn(pruned, camera, mode, true);
+        EXPECT_GT(psnrOf(frame, truth, sky), psnrOf(whole, truth, sky) - 3.5);
+        EXPECT_GT(psnrOf(frame, truth, all), psnrOf(whole, truth, all) - 3.5);
     }
 }
 
