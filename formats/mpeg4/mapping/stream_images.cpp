@@ -116,7 +116,8 @@ std::size_t StreamImages::sampleAt(const Node& texture, const ElementaryStream& 
     if (stream.samples.size() < 2 || found == presentations_->end()) return 0;
     const Presentation& shown = found->second;
     const double slack = std::max(slack_, halfTick(shown.tick, now_));
-    return shown.sampleAt(mediaTimeOf(texture, shown.duration, now_, slack), slack);
+    return shown.sampleAt(mediaTimeOf(texture, shown.duration, now_, slack),
+                          runsBackwards(texture) ? -slack : slack);
 }
 
 const ElementaryStream* StreamImages::stream(const Node& texture) const {

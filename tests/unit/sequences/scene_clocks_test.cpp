@@ -215,6 +215,20 @@ TEST(SceneClocks, MoviesKeepTheirStartAndSpeedWhileActive) {
                    {{2.6, 5}, {3.1, 0}, {3.3, 1}, {4.4, 5}});
 }
 
+TEST(SceneClocks, MoviesRunBackToTheirFirstPicture) {
+    for (const float speed : {1.0f, 2.0f}) {
+        const auto at = [&](double seconds) { return seconds / speed; };
+        expectPictures(film("speed -" + std::to_string(speed)), {{at(.1), 5},
+                                                                 {at(.6), 4},
+                                                                 {at(1.1), 3},
+                                                                 {at(1.6), 2},
+                                                                 {at(2.1), 1},
+                                                                 {at(2.6), 0},
+                                                                 {at(2.9), 0},
+                                                                 {at(3.5), 0}});
+    }
+}
+
 TEST(SceneClocks, ObjectDescriptorsActAtTheirTime) {
     for (const char* commands : {"", "AT 2000 { REPLACE TR.rotation BY 0 0 1 0.0001 }"}) {
         Document document = film("", commands);
