@@ -84,6 +84,7 @@ Presentation presentationOf(const ElementaryStream& stream) {
             edited.shown.push_back(
                 {first ? from : from + std::max(0.0, entry->time - media), entry->sample});
             first = false;
+            if (edit.rate == 0) break;  // one picture, for all of the edit
         }
     }
     return edited.shown.empty() ? all : edited;

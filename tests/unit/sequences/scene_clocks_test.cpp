@@ -262,3 +262,15 @@ DepthImage { orthographic FALSE diTexture SimpleTexture { depth PixelTexture { i
     EXPECT_EQ(line.count(), 6u + 26u);
     EXPECT_NEAR(line.times.back(), 4, 1e-9);
 }
+
+TEST(MediaClock, DwellsOnAPicture) {
+    // media_rate 0: ISO/IEC 14496-12, 8.6.6.
+    ElementaryStream stream = pictures({0, 40, 80, 120, 160, 200});
+    stream.edits = {1000, {{1000, 1000, 0}, {1000, 0, 0x10000}}};
+    const Presentation shown = presentationOf(stream);
+    std::vector<std::size_t> samples;
+    for (const double time : {.1, .4, .6, .9, 1.1, 1.6})
+        samples.push_back(shown.sampleAt(time, 1e-6));
+    EXPECT_EQ(samples, (std::vector<std::size_t>{2, 2, 2, 2, 0, 1}));
+    EXPECT_NEAR(shown.duration, 2, 1e-9);
+}
