@@ -51,18 +51,28 @@ std::optional<FieldValue> valueAt(const Node& node, float fraction) {
     return FieldValue(between((*values)[at - 1], (*values)[at], t));
 }
 
-std::optional<FieldValue> interpolated(const Node& node, float fraction) {
-    if (node.is("PositionInterpolator")) return valueAt<glm::vec3>(node, fraction);
-    if (node.is("OrientationInterpolator")) return valueAt<Rotation>(node, fraction);
-    if (node.is("ScalarInterpolator")) return valueAt<float>(node, fraction);
-    if (node.is("PositionInterpolator2D")) return valueAt<glm::vec2>(node, fraction);
-    if (node.is("ColorInterpolator")) return valueAt<Color>(node, fraction);
-    return {};
+/// What computes the value of a node at a fraction; null where nothing does.
+using Interpolation = std::optional<FieldValue> (*)(const Node& node, float fraction);
+Interpolation interpolationOf(const Node& node) {
+    if (node.is("PositionInterpolator")) return valueAt<glm::vec3>;
+    if (node.is("OrientationInterpolator")) return valueAt<Rotation>;
+    if (node.is("ScalarInterpolator")) return valueAt<float>;
+    if (node.is("PositionInterpolator2D")) return valueAt<glm::vec2>;
+    if (node.is("ColorInterpolator")) return valueAt<Color>;
+    return nullptr;
 }
 
 bool isField(const NodePtr& node, int field, std::string_view name) {
     return node && field >= 0 && field < static_cast<int>(node->info->fields.size()) &&
            node->info->fields[field].name == name;
+}
+
+/// Whether a route ends in a field that keeps a value of those that are sent here.
+bool keepsValue(const Route& route) {
+    const auto& fields = route.to->info->fields;
+    if (route.toField < 0 || route.toField >= static_cast<int>(fields.size())) return false;
+    const FieldInfo& field = fields[route.toField];
+    return field.hasValue() && !isMultiple(field.type) && field.type != FieldType::SFNode;
 }
 
 /// The routes of a scene, along which clocks send.
@@ -109,18 +119,15 @@ class Events {
     }
 
     void receive(const Route& route, const FieldValue& value) {
-        const auto& fields = route.to->info->fields;
-        if (route.toField < 0 || route.toField >= static_cast<int>(fields.size())) return;
-        const FieldInfo& field = fields[route.toField];
         if (isField(route.to, route.toField, "set_fraction")) {
             const float* fraction = std::get_if<float>(&value);
-            if (!fraction) return;
-            if (const auto result = interpolated(*route.to, *fraction))
+            const Interpolation at = interpolationOf(*route.to);
+            if (!fraction || !at) return;
+            if (const auto result = at(*route.to, *fraction))
                 send(route.to, "value_changed", *result);
-        } else if (field.hasValue() && typeOf(value) == field.type && !isMultiple(field.type) &&
-                   field.type != FieldType::SFNode) {
+        } else if (keepsValue(route) && typeOf(value) == typeOf(route.to->value(route.toField))) {
             route.to->set(route.toField, value);
-            send(route.to, field.name, value);
+            send(route.to, route.to->info->fields[route.toField].name, value);
         }
     }
 
@@ -165,6 +172,40 @@ std::optional<float> fractionOf(const Node& clock, double now) {
     // The end of a cycle counts as 1, not as the start of the next.
     const bool atEnd = passed == whole && passed > 0 && now >= run->end;
     return static_cast<float>(atEnd ? 1.0 : passed - whole);
+}
+
+std::set<std::string> routesNotFollowed(const Scene& scene) {
+    std::unordered_map<const Node*, std::vector<const Route*>> from;
+    std::vector<const Route*> reached;
+    for (const Route& route : scene.routes) {
+        if (!route.from || !route.to) continue;
+        from[route.from.get()].push_back(&route);
+        if (route.from->is("TimeSensor")) reached.push_back(&route);
+    }
+    std::unordered_set<const Route*> seen(reached.begin(), reached.end());
+    std::set<std::string> lost;
+    while (!reached.empty()) {
+        const Route& route = *reached.back();
+        reached.pop_back();
+        const auto nameOf = [](const NodePtr& node, int field) {
+            const auto& fields = node->info->fields;
+            return field >= 0 && field < static_cast<int>(fields.size()) ? fields[field].name : "";
+        };
+        const std::string out = nameOf(route.from, route.fromField);
+        const std::string in = nameOf(route.to, route.toField);
+        const bool sent = !route.from->is("TimeSensor") || out == "fraction_changed";
+        const bool drives = in == "set_fraction" && interpolationOf(*route.to);
+        if (!sent || !(drives || keepsValue(route))) {
+            lost.insert(fmt::format("{}.{} TO {}.{}", route.from->info->name, out,
+                                    route.to->info->name, in));
+            continue;
+        }
+        const std::string next = drives ? "value_changed" : in;
+        for (const Route* on : from[route.to.get()])
+            if (isField(on->from, on->fromField, next) && seen.insert(on).second)
+                reached.push_back(on);
+    }
+    return lost;
 }
 
 void applyInterpolators(Scene& scene, double now) {

@@ -2,6 +2,8 @@
 
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
 
 #include "formats/mpeg4/scene/scene.hpp"
 
@@ -38,6 +40,10 @@ struct ClockRun {
 /// once, so that circles of routes end (ISO/IEC 14772-1, 4.10.4). Values of another type than the
 /// field's, and interpolators whose keys and values do not fit each other, are passed over.
 void applyInterpolators(Scene& scene, double now);
+
+/// What clocks send to that is not followed here, as `TYPE.event TO TYPE.field`: ROUTEs into
+/// PROTOs, through nodes that are not computed, and of other events of clocks than the fraction.
+[[nodiscard]] std::set<std::string> routesNotFollowed(const Scene& scene);
 
 /// The scene at one moment after another, moved by its clocks as the commands until then have left
 /// them. A field keeps the last value that came to it, be it from a command or along a route; a

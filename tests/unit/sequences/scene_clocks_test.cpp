@@ -263,6 +263,56 @@ DepthImage { orthographic FALSE diTexture SimpleTexture { depth PixelTexture { i
     EXPECT_NEAR(line.times.back(), 4, 1e-9);
 }
 
+TEST(SceneClocks, WhatTheyDoNotMoveIsNoted) {
+    const auto noteOf = [](const Document& document) {
+        Job job;
+        EXPECT_TRUE(bundleFromScene(document, {}, job));
+        for (const std::string& note : job.takeNotes())
+            if (note.find("not followed") != std::string::npos) return note;
+        return std::string();
+    };
+    EXPECT_EQ(noteOf(moved("cycleInterval 4")), "");
+    const std::string start = "clocks move nothing through these, which are not followed: ";
+    const auto with = [](const std::string& nodes, const std::string& routes,
+                         const std::string& protos = "") {
+        return readText(protos + R"(Group { children [ DEF TR Transform { children [
+DepthImage { diTexture SimpleTexture { depth PixelTexture { image 1 1 1 200 } } } ] }
+DEF TS TimeSensor { } DEF PI PositionInterpolator { } )" +
+                        nodes + " ] }\n" + routes);
+    };
+    EXPECT_EQ(noteOf(with("DEF V Valuator { }",
+                          "ROUTE TS.fraction_changed TO V.inSFFloat "
+                          "ROUTE V.outSFVec3f TO TR.translation")),
+              start + "TimeSensor.fraction_changed TO Valuator.inSFFloat");
+    EXPECT_EQ(noteOf(with("DEF T2 TimeSensor { }", "ROUTE T2.cycleTime TO TS.startTime")),
+              start + "TimeSensor.cycleTime TO TimeSensor.startTime");
+    // At the end of a chain.
+    EXPECT_EQ(noteOf(with("DEF N Transform { } DEF V Valuator { }",
+                          "ROUTE TS.fraction_changed TO PI.set_fraction "
+                          "ROUTE PI.value_changed TO N.translation "
+                          "ROUTE N.translation TO V.inSFVec3f")),
+              start + "Transform.translation TO Valuator.inSFVec3f");
+    // What no clock reaches.
+    EXPECT_EQ(noteOf(with("DEF V Valuator { }", "ROUTE V.outSFVec3f TO TR.translation")), "");
+
+    const std::string mover = R"(PROTO Mover [ eventIn SFFloat fr exposedField SFVec3f at 0 0 0 ] {
+    Transform { translation IS at children [ PositionInterpolator { set_fraction IS fr } ] } }
+)";
+    EXPECT_EQ(noteOf(with("DEF M Mover { }", "ROUTE TS.fraction_changed TO M.fr", mover)),
+              start + "TimeSensor.fraction_changed TO Mover.fr");
+    EXPECT_EQ(noteOf(with("DEF M Mover { }",
+                          "ROUTE TS.fraction_changed TO PI.set_fraction "
+                          "ROUTE PI.value_changed TO M.at",
+                          mover)),
+              "");
+    const std::string clock = "PROTO Clock [ ] { Group { children [ TimeSensor { } ] } }\n";
+    EXPECT_EQ(noteOf(with("Clock { }", "", clock)), start + "TimeSensor inside of PROTO Clock");
+    EXPECT_EQ(noteOf(with("Outer { }", "",
+                          clock + "PROTO Outer [ ] { Group { children [ Clock { } ] } }\n")),
+              start + "TimeSensor inside of PROTO Clock, TimeSensor inside of PROTO Outer");
+    EXPECT_EQ(noteOf(with("", "", clock)), "") << "no instance";
+}
+
 TEST(MediaClock, DwellsOnAPicture) {
     // media_rate 0: ISO/IEC 14496-12, 8.6.6.
     ElementaryStream stream = pictures({0, 40, 80, 120, 160, 200});
