@@ -15,9 +15,11 @@ namespace {
 
 /// Moments a second where only interpolators move.
 constexpr double kSmoothRate = 25;
-/// Nodes that are looked at for all moments together, so that a small hostile file cannot keep us
-/// busy: some seconds.
-constexpr std::uint64_t kMaxVisits = 100'000'000;
+/// Nodes of the scene that are walked for all moments together, so that a small hostile file cannot
+/// keep us busy: as many as commands may cost, ten seconds.
+constexpr std::uint64_t kMaxVisits = 20'000'000;
+/// Textures and clocks that are asked again in the time that one node is walked (0.5 and 0.05 us).
+constexpr std::uint64_t kAskedPerVisit = 10;
 constexpr double kEver = std::numeric_limits<double>::infinity();
 
 /// Seconds, from `begin` and before `end`.
@@ -58,7 +60,9 @@ class Moments {
         begin = *std::ranges::min_element(commands);
         cuts = commands;
         for (const OdFrame& frame : document_.odFrames)
-            cuts.push_back(static_cast<double>(frame.time) / document_.odStream.timescale);
+            descriptors_.push_back(static_cast<double>(frame.time) / document_.odStream.timescale);
+        std::ranges::sort(descriptors_);
+        cuts.insert(cuts.end(), descriptors_.begin(), descriptors_.end());
         std::erase_if(cuts, [&](double t) { return !(t >= begin && t <= kLatestMoment); });
         std::ranges::sort(cuts);
         cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
@@ -83,29 +87,35 @@ class Moments {
     /// the scene, of which the frames tell.
     Result<bool> goTo(double time, bool first) {
         std::vector<const ElementaryStream*> before;
-        for (const NodePtr& texture : textures_) before.push_back(images_.stream(*texture));
+        if (std::ranges::binary_search(descriptors_, time))
+            for (const NodePtr& texture : textures_) before.push_back(images_.stream(*texture));
         const auto was = scenes_.structure();
         const std::uint32_t timescale = document_.sceneStream.timescale;
         auto scene = scenes_.at(ticksBegun(time, timescale, halfTick(1.0 / timescale, time)));
         if (!scene && first) return propagate(scene);
         if (!scene) return false;
         images_.setTime(time, halfTick(1.0 / document_.odStream.timescale, time));
-        for (std::size_t i = 0; i < textures_.size(); ++i) {
+        for (std::size_t i = 0; i < before.size(); ++i) {
             if (images_.stream(*textures_[i]) == before[i]) continue;
             times.push_back(time);
             break;
         }
-        if (first || was != scenes_.structure()) collect(**scene);
-        visits_ += textures_.size() + clocks_.size();
-        if (visits_ > kMaxVisits)
+        const auto is = scenes_.structure();
+        if (first || was.views != is.views) findTextures(**scene);
+        if (first || was.routes != is.routes) {
+            clocks_ = clocksOf(**scene);
+            visits_ += (*scene)->routes.size();
+        }
+        asked_ += textures_.size() + clocks_.size();
+        if (visits_ + asked_ / kAskedPerVisit > kMaxVisits)
             return fail(ErrorCode::unsupported,
-                        "the scene changes too often for its size (more than {} node visits)",
+                        "the commands restructure the scene too often (more than {} node visits)",
                         kMaxVisits);
         return true;
     }
 
-    /// What may run in a scene: the images of its DepthImages and OctreeImages, and clocks.
-    void collect(const Scene& scene) {
+    /// The images of DepthImages and OctreeImages, which may run.
+    void findTextures(const Scene& scene) {
         textures_.clear();
         std::unordered_set<const Node*> seen;
         forEachNode(scene.root, [&](const NodePtr& node) {
@@ -115,11 +125,10 @@ class Moments {
             if (!texture) return;
             for (const Node::SetField& field : texture->setFields)
                 if (const auto* image = std::get_if<NodePtr>(&field.value);
-                    image && *image && seen.insert(image->get()).second)
+                    image && *image && (*image)->info->find("url") >= 0 &&
+                    seen.insert(image->get()).second)
                     textures_.push_back(*image);
         });
-        clocks_ = clocksOf(scene);
-        visits_ += scene.routes.size();
     }
 
     struct Movie {
@@ -206,8 +215,9 @@ class Moments {
     const Document& document_;
     StreamImages images_;
     SceneInTime scenes_;
+    std::vector<double> descriptors_;  ///< when they change, ascending
     std::vector<NodePtr> textures_, clocks_;
-    std::uint64_t visits_ = 0;
+    std::uint64_t visits_ = 0, asked_ = 0;
 };
 
 }  // namespace

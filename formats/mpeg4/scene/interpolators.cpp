@@ -216,17 +216,17 @@ struct MovingScene::Impl {
     SceneInTime moments;
     std::uint32_t timescale;
     std::optional<Events> events;
-    std::uint64_t structure = 0;  ///< that the events are of
-    double before = 0;            ///< of which the scene is
-    bool moved = false;           ///< by events
+    std::uint64_t routes = 0;  ///< SceneInTime::Structure::routes that the events are of
+    double before = 0;         ///< of which the scene is
+    bool moved = false;        ///< by events
 
     /// Applies the commands until a time. The events of the scene before them must have been sent.
     Result<Scene*> go(std::uint64_t until) {
         auto scene = moments.at(until);
-        if (!scene || !events || structure != moments.structure()) {
+        if (!scene || !events || routes != moments.structure().routes) {
             events.reset();
             if (scene) events.emplace(**scene);
-            structure = moments.structure();
+            routes = moments.structure().routes;
         }
         return scene;
     }

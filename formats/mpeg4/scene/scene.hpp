@@ -387,8 +387,13 @@ class SceneInTime {
 
     /// When the first commands come that are not applied yet; nothing after the last.
     [[nodiscard]] std::optional<std::uint64_t> next() const;
-    /// A number that changes when commands change which nodes or routes the scene has.
-    [[nodiscard]] std::uint64_t structure() const;
+    /// Numbers that change when commands change which DepthImages and textures of theirs are in the
+    /// scene, and which nodes its routes are between.
+    struct Structure {
+        std::uint64_t views = 0, routes = 0;
+        bool operator==(const Structure&) const = default;
+    };
+    [[nodiscard]] Structure structure() const;
 
   private:
     struct Impl;

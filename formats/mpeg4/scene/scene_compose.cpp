@@ -23,12 +23,35 @@ bool isHeldWhileActive(const NodeInfo& node, int field) {
     return name == "startTime" || name == "cycleInterval" || name == "speed";
 }
 
-/// Whether a command may change which nodes or routes a scene has.
-bool restructures(const Command& command) {
-    if (const auto* c = std::get_if<ReplaceField>(&command))
-        return std::holds_alternative<NodePtr>(c->value) ||
-               std::holds_alternative<NodeList>(c->value);
-    return true;
+/// Whether nodes with textures of views are in what an insertion brings.
+bool holdsViews(const FieldValue& value) {
+    bool holds = false;
+    if (const NodePtr* root = std::get_if<NodePtr>(&value))
+        forEachNode(*root, [&](const NodePtr& node) {
+            holds = holds || node->info->find("diTexture") >= 0;
+        });
+    return holds;
+}
+
+/// Counts what a command may change; it may be more than it does.
+void count(const Command& command, SceneInTime::Structure& structure) {
+    const auto isNodes = [](const FieldValue& value) {
+        return std::holds_alternative<NodePtr>(value) || std::holds_alternative<NodeList>(value);
+    };
+    const bool isRoute = std::holds_alternative<InsertRoute>(command) ||
+                         std::holds_alternative<DeleteRoute>(command) ||
+                         std::holds_alternative<ReplaceRoute>(command);
+    if (isRoute || std::holds_alternative<ReplaceScene>(command) ||
+        std::holds_alternative<ReplaceNode>(command) || std::holds_alternative<DeleteNode>(command))
+        ++structure.routes;
+    if (isRoute) return;
+    bool changes = true;
+    if (const auto* c = std::get_if<ReplaceField>(&command)) changes = isNodes(c->value);
+    if (const auto* c = std::get_if<ReplaceIndexed>(&command)) changes = isNodes(c->value);
+    // What comes anew takes nothing away.
+    if (const auto* c = std::get_if<InsertNode>(&command)) changes = holdsViews(c->node);
+    if (const auto* c = std::get_if<InsertIndexed>(&command)) changes = holdsViews(c->value);
+    if (changes) ++structure.views;
 }
 
 /// Node visits that all commands together may cost, so that a small hostile file cannot keep us
@@ -366,14 +389,14 @@ struct SceneInTime::Impl {
     ActiveNode active;
     std::vector<std::size_t> order;  ///< of frames, by time
     std::size_t next = 0;            ///< in order
-    std::uint64_t structure = 0;
+    Structure structure;
     std::unique_ptr<Composer> composer;
 };
 
 SceneInTime::SceneInTime(const std::vector<CommandFrame>& frames, std::uint32_t timescale,
                          bool timesFromStart, ActiveNode active)
     : impl_(std::make_unique<Impl>(
-          Impl{frames, timescale, timesFromStart, std::move(active), {}, 0, 0, nullptr})) {
+          Impl{frames, timescale, timesFromStart, std::move(active), {}, 0, {}, nullptr})) {
     impl_->order.resize(frames.size());
     std::iota(impl_->order.begin(), impl_->order.end(), std::size_t{0});
     std::ranges::stable_sort(impl_->order, {}, [&](std::size_t i) { return frames[i].time; });
@@ -392,7 +415,7 @@ std::optional<std::uint64_t> SceneInTime::next() const {
     return impl_->frames[impl_->order[impl_->next]].time;
 }
 
-std::uint64_t SceneInTime::structure() const {
+SceneInTime::Structure SceneInTime::structure() const {
     return impl_->structure;
 }
 
@@ -402,12 +425,13 @@ Result<Scene*> SceneInTime::at(std::uint64_t until) {
     if (!i.composer || back) {
         i.composer = std::make_unique<Composer>(i.active);
         i.next = 0;
-        ++i.structure;
+        ++i.structure.views;
+        ++i.structure.routes;
     }
     for (; i.next < i.order.size() && i.frames[i.order[i.next]].time <= until; ++i.next) {
         const CommandFrame& frame = i.frames[i.order[i.next]];
         const double now = i.timescale == 0 ? 0 : static_cast<double>(frame.time) / i.timescale;
-        if (std::ranges::any_of(frame.commands, restructures)) ++i.structure;
+        for (const Command& command : frame.commands) count(command, i.structure);
         if (auto done = i.composer->run(frame.commands, now, i.timesFromStart ? 0 : now); !done) {
             restart();
             return tl::unexpected(done.error());

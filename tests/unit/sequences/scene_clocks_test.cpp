@@ -250,6 +250,22 @@ TEST(SceneClocks, ObjectDescriptorsActAtTheirTime) {
     EXPECT_EQ(opened(document)->timeline().count(), 1u);
 }
 
+TEST(SceneClocks, MoviesComeAndGoWithTheirNodes) {
+    Document document = readText(R"(DEF G Group { children [ Group { } ] }
+AT 500 { APPEND TO G.children Group { } }
+AT 1000 { APPEND TO G.children DEF V DepthImage { diTexture SimpleTexture {
+    depth DEF MT MovieTexture { url [od:10] } } } }
+AT 2000 { DELETE V }
+)");
+    addStream(document, 0, pictures({0, 40, 80, 120, 160, 200}));
+    Job job;
+    const auto images = StreamImages::make(document, {}, job.limits);
+    ASSERT_TRUE(images);
+    const auto line = timelineOf(document, *images);
+    ASSERT_TRUE(line) << line.error().text();
+    EXPECT_EQ(line->times, (std::vector<double>{0, 0.5, 1, 1.5, 2}));
+}
+
 TEST(SceneClocks, RunOnWherePicturesHaveEnded) {
     // While pictures run, theirs are the moments.
     Document document = moved("cycleInterval 4", "", R"(
