@@ -12,6 +12,7 @@
 #include "formats/mpeg4/mapping/stream_images.hpp"
 #include "formats/mpeg4/mapping/view_notes.hpp"
 #include "formats/mpeg4/mapping/view_read.hpp"
+#include "formats/mpeg4/scene/interpolators.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/frustum.hpp"
@@ -89,6 +90,7 @@ class BundleReader {
             job_.note(fmt::format(
                 "nodes that place or choose their children by themselves are read as Group: {}",
                 fmt::join(shown.asGroups, ", ")));
+        noteUnmoved(scene, shown);
         Object object;
         STX_TRY(object.plans, makePlans(shown));
         object.notes = notesOf(shown, object.plans);
@@ -277,6 +279,16 @@ class BundleReader {
             job_.note(fmt::format("view '{}': {}; borders of what has no depth may show", view.name,
                                   ok.error().text()));
         return ok.has_value();
+    }
+
+    /// Says what clocks would move, and do not here.
+    void noteUnmoved(const Scene& scene, const ShownScene& shown) {
+        std::set<std::string> unmoved = routesNotFollowed(scene);
+        for (const std::string& proto : shown.withClocks)
+            unmoved.insert(fmt::format("TimeSensor inside of PROTO {}", proto));
+        if (!unmoved.empty())
+            job_.note(fmt::format("clocks move nothing through these, which are not followed: {}",
+                                  fmt::join(unmoved, ", ")));
     }
 
     /// Says what would change the views in time, besides commands.

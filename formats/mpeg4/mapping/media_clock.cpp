@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <ranges>
 
 #include "lib/model/sequence.hpp"
 
@@ -83,6 +84,7 @@ Presentation presentationOf(const ElementaryStream& stream) {
             edited.shown.push_back(
                 {first ? from : from + std::max(0.0, entry->time - media), entry->sample});
             first = false;
+            if (edit.rate == 0) break;  // one picture, for all of the edit
         }
     }
     return edited.shown.empty() ? all : edited;
@@ -106,23 +108,47 @@ double mediaTimeOf(const Node& texture, double duration, double now, double slac
     return backwards ? duration - passed * speed : passed * speed;
 }
 
-std::vector<double> changesOf(const Node& texture, const Presentation& stream, double& end) {
+bool runsBackwards(const Node& texture) {
+    return runOf(texture).speed < 0;
+}
+
+std::optional<ClockRun> runOfMovie(const Node& texture, double duration) {
     const Run run = runOf(texture);
-    std::vector<double> times;
-    const double speed = std::abs(run.speed);
-    if (speed == 0 || stream.shown.size() < 2) return times;
-    double last = run.start + stream.duration / speed;
-    if (run.stop > run.start) last = std::min(last, run.stop);
-    for (std::size_t i = 0; i < stream.shown.size(); ++i) {
-        const double until =
-            i + 1 < stream.shown.size() ? stream.shown[i + 1].time : stream.duration;
-        const double at = run.speed < 0 ? (stream.duration - until) : stream.shown[i].time;
-        const double time = run.start + at / speed;
-        if (time >= 0 && time < last - halfTick(stream.tick, last)) times.push_back(time);
+    const double cycle = duration / std::abs(run.speed);
+    if (run.speed == 0 || !(cycle > 0)) return {};
+    return ClockRun(run.start, cycle, run.loop, run.stop);
+}
+
+bool addChanges(const Node& texture, const Presentation& stream, double from, double until,
+                std::vector<double>& times) {
+    const auto run = runOfMovie(texture, stream.duration);
+    if (!run || stream.shown.size() < 2) return true;
+    const std::size_t count = stream.shown.size();
+    const double speed = std::abs(runOf(texture).speed);
+    const bool backwards = runsBackwards(texture);
+    // Seconds of a cycle after which its picture `i` comes.
+    const auto after = [&](std::size_t i) {
+        if (!backwards) return stream.shown[i].time / speed;
+        const std::size_t next = count - i;
+        return (next < count ? stream.duration - stream.shown[next].time : 0) / speed;
+    };
+    if (std::isfinite(run->end))
+        until = std::min(until, run->end - halfTick(stream.tick, run->end));
+    from = std::max(from, 0.0);
+    for (double cycle = std::max(0.0, std::floor((from - run->start) / run->cycle));; ++cycle) {
+        const double start = run->start + cycle * run->cycle;
+        if (!(start < until)) return true;
+        const auto numbers = std::views::iota(std::size_t{0}, count);
+        auto i = *std::ranges::lower_bound(numbers, from, {},
+                                           [&](std::size_t k) { return start + after(k); });
+        // The first picture is shown from where the cycle begins.
+        if (cycle > 0 && start >= from) times.push_back(start);
+        for (; i < count && start + after(i) < until && after(i) < run->cycle; ++i) {
+            if (times.size() > kMostMoments) return false;
+            times.push_back(start + after(i));
+        }
+        if (times.size() > kMostMoments) return false;
     }
-    std::ranges::sort(times);
-    end = std::max(end, last);
-    return times;
 }
 
 }  // namespace stx::mpeg4

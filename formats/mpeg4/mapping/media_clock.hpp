@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "formats/mpeg4/scene/document.hpp"
+#include "formats/mpeg4/scene/interpolators.hpp"
 
 namespace stx::mpeg4 {
 
@@ -47,9 +49,16 @@ struct Presentation {
 /// A cycle that ends within `slack` seconds has ended.
 [[nodiscard]] double mediaTimeOf(const Node& texture, double duration, double now, double slack);
 
-/// The moments of the scene at which a texture of a stream changes, within its first cycle;
-/// seconds, ascending. `end` becomes the end of that cycle when it is later.
-[[nodiscard]] std::vector<double> changesOf(const Node& texture, const Presentation& stream,
-                                            double& end);
+/// Whether a texture plays its stream from its end. Its time at a moment is where the picture ends
+/// that is shown then, so that what is shown from then on is the one before.
+[[nodiscard]] bool runsBackwards(const Node& texture);
+
+/// When a texture of a stream of `duration` seconds is active; nothing where its picture stays.
+[[nodiscard]] std::optional<ClockRun> runOfMovie(const Node& texture, double duration);
+
+/// Adds the moments of the scene, from `from` and before `until`, at which a texture of a stream
+/// changes; seconds, ascending. False when there are more than kMostMoments.
+[[nodiscard]] bool addChanges(const Node& texture, const Presentation& stream, double from,
+                              double until, std::vector<double>& times);
 
 }  // namespace stx::mpeg4

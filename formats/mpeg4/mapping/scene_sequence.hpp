@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "formats/mpeg4/mapping/mapping.hpp"
+#include "formats/mpeg4/mapping/scene_timeline.hpp"
 #include "formats/mpeg4/mapping/stream_images.hpp"
 #include "lib/model/sequence.hpp"
 
@@ -10,18 +11,10 @@ namespace stx::mpeg4 {
 
 /// A presentation in time: MovieTextures (and other textures of streams with several pictures) at
 /// their composition times, commands at theirs, interpolators that TimeSensors drive. Its timeline
-/// has every moment at which a picture or a command changes something, within the first cycle of
-/// what repeats; where only interpolators move, 25 moments a second and, of a clock that stops, the
-/// one at its end. Pictures are decoded when a frame is asked for. Errors as bundleFromScene().
+/// is timelineOf(). Pictures are decoded when a frame is asked for. Errors as bundleFromScene().
 [[nodiscard]] Result<std::unique_ptr<Sequence>> sequenceFromScene(Document document,
                                                                   const SceneReadOptions& options,
                                                                   Job& job);
-
-/// When such a sequence changes, by the film's own clock where a note tells how that begins: at
-/// least one moment. Moments of two streams within half a tick of the coarser clock are one.
-/// Errors: (unsupported) more than four million. `timesFromStart`: as SceneReadOptions has it.
-[[nodiscard]] Result<Timeline> timelineOf(const Document& document, const StreamImages& images,
-                                          bool timesFromStart = false);
 
 /// The object of a presentation in a scene as it is at the moment of `images`; see
 /// bundleFromScene().

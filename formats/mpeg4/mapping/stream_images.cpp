@@ -1,6 +1,7 @@
 #include "formats/mpeg4/mapping/stream_images.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
@@ -71,7 +72,10 @@ Result<StreamImages> StreamImages::make(const Document& document,
     double start = 0;
     if (!document.frames.empty())
         start = static_cast<double>(document.frames[0].time) / document.sceneStream.timescale;
-    images.byId_.clear();
+    images.odOrder_.resize(document.odFrames.size());
+    std::iota(images.odOrder_.begin(), images.odOrder_.end(), std::size_t{0});
+    std::ranges::stable_sort(images.odOrder_, {},
+                             [&](std::size_t i) { return document.odFrames[i].time; });
     images.setTime(start);
     // Found before threads ask for them.
     for (const OdFrame& frame : document.odFrames)
@@ -86,26 +90,34 @@ Result<StreamImages> StreamImages::make(const Document& document,
 void StreamImages::setTime(double now, double slack) {
     now_ = now;
     slack_ = slack;
-    const Document& document = *document_;
-    if (!byId_.empty() && document.odFrames.size() <= 1) return;
-    for (const ObjectDescriptor* od : document.objectDescriptors()) byId_[od->id] = od;
-    if (document.odFrames.empty()) return;
-    const auto ticks = ticksBegun(now, document.odStream.timescale, slack);
-    for (const ObjectDescriptor* od : document.objectDescriptors(ticks)) byId_[od->id] = od;
+    const std::vector<OdFrame>& frames = document_->odFrames;
+    const auto ticks = ticksBegun(now, document_->odStream.timescale, slack);
+    if (!begun_ || ticks < odTicks_) {
+        byId_.clear();
+        for (const ObjectDescriptor* od : document_->objectDescriptors()) byId_[od->id] = od;
+        nextOd_ = 0;
+        begun_ = true;
+    }
+    odTicks_ = ticks;
+    for (; nextOd_ < odOrder_.size() && frames[odOrder_[nextOd_]].time <= ticks; ++nextOd_)
+        for (const OdCommand& command : frames[odOrder_[nextOd_]].commands)
+            if (const auto* update = std::get_if<UpdateObjectDescriptors>(&command))
+                for (const ObjectDescriptor& od : update->descriptors) byId_[od.id] = &od;
 }
 
 const Presentation& StreamImages::presentation(const ElementaryStream& stream) const {
-    const auto found = presentations_.find(&stream);
-    if (found != presentations_.end()) return found->second;
-    return presentations_.emplace(&stream, presentationOf(stream)).first->second;
+    const auto found = presentations_->find(&stream);
+    if (found != presentations_->end()) return found->second;
+    return presentations_->emplace(&stream, presentationOf(stream)).first->second;
 }
 
 std::size_t StreamImages::sampleAt(const Node& texture, const ElementaryStream& stream) const {
-    const auto found = presentations_.find(&stream);
-    if (stream.samples.size() < 2 || found == presentations_.end()) return 0;
+    const auto found = presentations_->find(&stream);
+    if (stream.samples.size() < 2 || found == presentations_->end()) return 0;
     const Presentation& shown = found->second;
     const double slack = std::max(slack_, halfTick(shown.tick, now_));
-    return shown.sampleAt(mediaTimeOf(texture, shown.duration, now_, slack), slack);
+    return shown.sampleAt(mediaTimeOf(texture, shown.duration, now_, slack),
+                          runsBackwards(texture) ? -slack : slack);
 }
 
 const ElementaryStream* StreamImages::stream(const Node& texture) const {

@@ -62,10 +62,16 @@ class StreamImages {
 
     const Document* document_ = nullptr;
     double now_ = 0, slack_ = 0;
-    mutable std::unordered_map<const ElementaryStream*, Presentation> presentations_;
+    /// Shared by copies: they are of one document.
+    std::shared_ptr<std::unordered_map<const ElementaryStream*, Presentation>> presentations_ =
+        std::make_shared<std::unordered_map<const ElementaryStream*, Presentation>>();
     std::shared_ptr<PictureCache> cache_;
     std::shared_ptr<StreamVideo> video_ = std::make_shared<StreamVideo>();
     std::unordered_map<int, const ObjectDescriptor*> byId_;
+    std::vector<std::size_t> odOrder_;  ///< of the document's frames of descriptors, by time
+    std::size_t nextOd_ = 0;            ///< in that order: the first that is not in byId_
+    std::uint64_t odTicks_ = 0;         ///< of byId_
+    bool begun_ = false;
     std::filesystem::path folder_;
     Limits limits_;
 };

@@ -51,13 +51,15 @@ std::optional<FieldValue> valueAt(const Node& node, float fraction) {
     return FieldValue(between((*values)[at - 1], (*values)[at], t));
 }
 
-std::optional<FieldValue> interpolated(const Node& node, float fraction) {
-    if (node.is("PositionInterpolator")) return valueAt<glm::vec3>(node, fraction);
-    if (node.is("OrientationInterpolator")) return valueAt<Rotation>(node, fraction);
-    if (node.is("ScalarInterpolator")) return valueAt<float>(node, fraction);
-    if (node.is("PositionInterpolator2D")) return valueAt<glm::vec2>(node, fraction);
-    if (node.is("ColorInterpolator")) return valueAt<Color>(node, fraction);
-    return {};
+/// What computes the value of a node at a fraction; null where nothing does.
+using Interpolation = std::optional<FieldValue> (*)(const Node& node, float fraction);
+Interpolation interpolationOf(const Node& node) {
+    if (node.is("PositionInterpolator")) return valueAt<glm::vec3>;
+    if (node.is("OrientationInterpolator")) return valueAt<Rotation>;
+    if (node.is("ScalarInterpolator")) return valueAt<float>;
+    if (node.is("PositionInterpolator2D")) return valueAt<glm::vec2>;
+    if (node.is("ColorInterpolator")) return valueAt<Color>;
+    return nullptr;
 }
 
 bool isField(const NodePtr& node, int field, std::string_view name) {
@@ -65,47 +67,86 @@ bool isField(const NodePtr& node, int field, std::string_view name) {
            node->info->fields[field].name == name;
 }
 
+/// Whether a route ends in a field that keeps a value of those that are sent here.
+bool keepsValue(const Route& route) {
+    const auto& fields = route.to->info->fields;
+    if (route.toField < 0 || route.toField >= static_cast<int>(fields.size())) return false;
+    const FieldInfo& field = fields[route.toField];
+    return field.hasValue() && !isMultiple(field.type) && field.type != FieldType::SFNode;
+}
+
+/// The routes of a scene, along which clocks send.
 class Events {
   public:
-    explicit Events(Scene& scene) : scene_(scene), done_(scene.routes.size(), false) {
+    explicit Events(Scene& scene)
+        : scene_(scene), clocks_(clocksOf(scene)), done_(scene.routes.size(), 0) {
+        if (clocks_.empty()) return;
         for (std::size_t i = 0; i < scene.routes.size(); ++i)
             from_[scene.routes[i].from.get()].push_back(i);
     }
 
+    /// What the clocks send after `before` and until `now`, in the order of its times; of each
+    /// clock the last. Whether there was any.
+    bool run(double before, double now, double slack) {
+        std::vector<std::pair<double, const NodePtr*>> events;
+        for (const NodePtr& clock : clocks_) {
+            const auto run = runOfClock(*clock);
+            if (!run || run->start > now + slack || run->end <= before + slack) continue;
+            events.emplace_back(run->end <= now + slack ? run->end : std::max(now, run->start),
+                                &clock);
+        }
+        std::ranges::stable_sort(events, {}, [](const auto& event) { return event.first; });
+        for (std::size_t i = 0; i < events.size(); ++i) {
+            // Routes work once for each time stamp.
+            if (i == 0 || events[i].first > events[i - 1].first) ++stamp_;
+            if (const auto fraction = fractionOf(**events[i].second, events[i].first))
+                send(*events[i].second, "fraction_changed", FieldValue(*fraction));
+        }
+        return !events.empty();
+    }
+
+  private:
     void send(const NodePtr& node, std::string_view event, const FieldValue& value) {
         const auto routes = from_.find(node.get());
         if (routes == from_.end()) return;
         for (const std::size_t i : routes->second) {
             const Route& route = scene_.routes[i];
-            if (done_[i] || !isField(route.from, route.fromField, event) || !route.to) continue;
-            done_[i] = true;
+            if (done_[i] == stamp_ || !isField(route.from, route.fromField, event) || !route.to)
+                continue;
+            done_[i] = stamp_;
             receive(route, value);
         }
     }
 
-  private:
     void receive(const Route& route, const FieldValue& value) {
-        const auto& fields = route.to->info->fields;
-        if (route.toField < 0 || route.toField >= static_cast<int>(fields.size())) return;
-        const FieldInfo& field = fields[route.toField];
         if (isField(route.to, route.toField, "set_fraction")) {
             const float* fraction = std::get_if<float>(&value);
-            if (!fraction) return;
-            if (const auto result = interpolated(*route.to, *fraction))
+            const Interpolation at = interpolationOf(*route.to);
+            if (!fraction || !at) return;
+            if (const auto result = at(*route.to, *fraction))
                 send(route.to, "value_changed", *result);
-        } else if (field.hasValue() && typeOf(value) == field.type && !isMultiple(field.type) &&
-                   field.type != FieldType::SFNode) {
+        } else if (keepsValue(route) && typeOf(value) == typeOf(route.to->value(route.toField))) {
             route.to->set(route.toField, value);
-            send(route.to, field.name, value);
+            send(route.to, route.to->info->fields[route.toField].name, value);
         }
     }
 
     Scene& scene_;
-    std::vector<bool> done_;  ///< of routes
+    std::vector<NodePtr> clocks_;
+    std::uint64_t stamp_ = 0;
+    std::vector<std::uint64_t> done_;  ///< the stamp at which each route has worked last
     std::unordered_map<const Node*, std::vector<std::size_t>> from_;
 };
 
-/// The clocks that routes leave, each once.
+constexpr double kEver = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+ClockRun::ClockRun(double startTime, double cycleSeconds, bool loop, double stopTime)
+    : start(startTime), cycle(cycleSeconds), end(loop ? kEver : startTime + cycleSeconds) {
+    if (stopTime > start) end = std::min(end, stopTime);
+}
+
 std::vector<NodePtr> clocksOf(const Scene& scene) {
     std::vector<NodePtr> clocks;
     std::unordered_set<const Node*> seen;
@@ -116,42 +157,107 @@ std::vector<NodePtr> clocksOf(const Scene& scene) {
     return clocks;
 }
 
-}  // namespace
-
-std::optional<float> fractionOf(const Node& clock, double now) {
+std::optional<ClockRun> runOfClock(const Node& clock) {
     const double cycle = clock.get<double>("cycleInterval");
     const double start = clock.get<double>("startTime");
-    const double stop = clock.get<double>("stopTime");
-    if (!clock.get<bool>("enabled") || !(cycle > 0) || !std::isfinite(start) || now < start)
-        return {};
-    double end = clock.get<bool>("loop") ? std::numeric_limits<double>::infinity() : start + cycle;
-    if (stop > start) end = std::min(end, stop);
-    const double passed = (std::min(now, end) - start) / cycle;
+    if (!clock.get<bool>("enabled") || !(cycle > 0) || !std::isfinite(start)) return {};
+    return ClockRun(start, cycle, clock.get<bool>("loop"), clock.get<double>("stopTime"));
+}
+
+std::optional<float> fractionOf(const Node& clock, double now) {
+    const auto run = runOfClock(clock);
+    if (!run || now < run->start) return {};
+    const double passed = (std::min(now, run->end) - run->start) / run->cycle;
     const double whole = std::floor(passed);
     // The end of a cycle counts as 1, not as the start of the next.
-    const bool atEnd = passed == whole && passed > 0 && now >= end;
+    const bool atEnd = passed == whole && passed > 0 && now >= run->end;
     return static_cast<float>(atEnd ? 1.0 : passed - whole);
 }
 
-std::vector<ClockSpan> clockSpans(const Scene& scene) {
-    std::vector<ClockSpan> spans;
-    for (const NodePtr& clock : clocksOf(scene)) {
-        const double cycle = clock->get<double>("cycleInterval");
-        const double start = std::max(0.0, clock->get<double>("startTime"));
-        if (clock->get<bool>("enabled") && cycle > 0 && std::isfinite(cycle) &&
-            std::isfinite(start))
-            spans.push_back({start, start + cycle, !clock->get<bool>("loop")});
+std::set<std::string> routesNotFollowed(const Scene& scene) {
+    std::unordered_map<const Node*, std::vector<const Route*>> from;
+    std::vector<const Route*> reached;
+    for (const Route& route : scene.routes) {
+        if (!route.from || !route.to) continue;
+        from[route.from.get()].push_back(&route);
+        if (route.from->is("TimeSensor")) reached.push_back(&route);
     }
-    return spans;
+    std::unordered_set<const Route*> seen(reached.begin(), reached.end());
+    std::set<std::string> lost;
+    while (!reached.empty()) {
+        const Route& route = *reached.back();
+        reached.pop_back();
+        const auto nameOf = [](const NodePtr& node, int field) {
+            const auto& fields = node->info->fields;
+            return field >= 0 && field < static_cast<int>(fields.size()) ? fields[field].name : "";
+        };
+        const std::string out = nameOf(route.from, route.fromField);
+        const std::string in = nameOf(route.to, route.toField);
+        const bool sent = !route.from->is("TimeSensor") || out == "fraction_changed";
+        const bool drives = in == "set_fraction" && interpolationOf(*route.to);
+        if (!sent || !(drives || keepsValue(route))) {
+            lost.insert(fmt::format("{}.{} TO {}.{}", route.from->info->name, out,
+                                    route.to->info->name, in));
+            continue;
+        }
+        const std::string next = drives ? "value_changed" : in;
+        for (const Route* on : from[route.to.get()])
+            if (isField(on->from, on->fromField, next) && seen.insert(on).second)
+                reached.push_back(on);
+    }
+    return lost;
 }
 
 void applyInterpolators(Scene& scene, double now) {
-    const auto clocks = clocksOf(scene);
-    if (clocks.empty()) return;
-    Events events(scene);
-    for (const NodePtr& clock : clocks)
-        if (const auto fraction = fractionOf(*clock, now))
-            events.send(clock, "fraction_changed", FieldValue(*fraction));
+    Events(scene).run(-kEver, now, 0);
+}
+
+struct MovingScene::Impl {
+    SceneInTime moments;
+    std::uint32_t timescale;
+    std::optional<Events> events;
+    std::uint64_t routes = 0;  ///< SceneInTime::Structure::routes that the events are of
+    double before = 0;         ///< of which the scene is
+    bool moved = false;        ///< by events
+
+    /// Applies the commands until a time. The events of the scene before them must have been sent.
+    Result<Scene*> go(std::uint64_t until) {
+        auto scene = moments.at(until);
+        if (!scene || !events || routes != moments.structure().routes) {
+            events.reset();
+            if (scene) events.emplace(**scene);
+            routes = moments.structure().routes;
+        }
+        return scene;
+    }
+};
+
+MovingScene::MovingScene(const std::vector<CommandFrame>& frames, std::uint32_t timescale,
+                         bool timesFromStart, ActiveNode active)
+    : impl_(new Impl{
+          SceneInTime(frames, timescale, timesFromStart, std::move(active)), timescale, {}}) {}
+MovingScene::MovingScene(MovingScene&&) noexcept = default;
+MovingScene& MovingScene::operator=(MovingScene&&) noexcept = default;
+MovingScene::~MovingScene() = default;
+
+Result<Scene*> MovingScene::at(double now, std::uint64_t until, double slack) {
+    Impl& i = *impl_;
+    // What routes have set has no way back.
+    if (i.moved && now < i.before) {
+        i.moments.restart();
+        i.events.reset();
+        i.moved = false;
+    }
+    for (auto next = i.moments.next(); next && *next <= until; next = i.moments.next()) {
+        const double time = static_cast<double>(*next) / i.timescale;
+        if (i.events && i.events->run(i.before, time, slack)) i.moved = true;
+        i.before = time;
+        STX_CHECK(i.go(*next));
+    }
+    STX_TRY(Scene * scene, i.go(until));
+    if (i.events->run(i.before, now, slack)) i.moved = true;
+    i.before = now;
+    return scene;
 }
 
 }  // namespace stx::mpeg4

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <memory>
 #include <optional>
+#include <set>
+#include <string>
 
 #include "formats/mpeg4/scene/scene.hpp"
 
@@ -8,22 +11,59 @@
 /// much of their cycle has passed along ROUTEs to interpolators, which send values to fields.
 namespace stx::mpeg4 {
 
+/// How a time-dependent node runs by its fields (ISO/IEC 14772-1, 4.6.9); seconds of the scene.
+struct ClockRun {
+    double start = 0;
+    double cycle = 0;  ///< above 0
+    double end = 0;    ///< when it becomes inactive; infinite where it loops and does not stop
+
+    /// A stopTime counts only after the start.
+    ClockRun(double startTime, double cycleSeconds, bool loop, double stopTime);
+    /// Not when it ends within `slack`.
+    [[nodiscard]] bool activeAt(double now, double slack) const {
+        return start <= now + slack && now + slack < end;
+    }
+};
+
+/// Nothing of a TimeSensor that does not run: it is not enabled, or its times are not usable.
+[[nodiscard]] std::optional<ClockRun> runOfClock(const Node& timeSensor);
+
 /// A clock's part of its cycle in [0, 1] at a time; nothing while it has never run. After its end:
 /// where it stopped. `now` is in seconds of the scene.
 [[nodiscard]] std::optional<float> fractionOf(const Node& timeSensor, double now);
 
-/// When a clock that drives something begins, and the end of its first cycle; seconds.
-struct ClockSpan {
-    double begin = 0, end = 0;
-    bool stops = false;  ///< at that end, which is held then
-};
-/// The spans of all clocks that a route leaves.
-[[nodiscard]] std::vector<ClockSpan> clockSpans(const Scene& scene);
+/// The TimeSensors whose fraction_changed a route leaves, each once.
+[[nodiscard]] std::vector<NodePtr> clocksOf(const Scene& scene);
 
 /// Sets the fields that routes reach as they are at `now`: Position-, Orientation-, Scalar-, Color-
 /// and PositionInterpolator2D, and Valuator-free chains of routes behind them. Each route works
 /// once, so that circles of routes end (ISO/IEC 14772-1, 4.10.4). Values of another type than the
 /// field's, and interpolators whose keys and values do not fit each other, are passed over.
 void applyInterpolators(Scene& scene, double now);
+
+/// What clocks send to that is not followed here, as `TYPE.event TO TYPE.field`: ROUTEs into
+/// PROTOs, through nodes that are not computed, and of other events of clocks than the fraction.
+[[nodiscard]] std::set<std::string> routesNotFollowed(const Scene& scene);
+
+/// The scene at one moment after another, moved by its clocks as the commands until then have left
+/// them. A field keeps the last value that came to it, be it from a command or along a route; a
+/// clock sends values while it is active and when it ends (ISO/IEC 14772-1, 4.7 and 6.50).
+class MovingScene {
+  public:
+    /// As SceneInTime has them; the timescale must be known.
+    MovingScene(const std::vector<CommandFrame>& frames, std::uint32_t timescale,
+                bool timesFromStart, ActiveNode active);
+    MovingScene(MovingScene&&) noexcept;
+    MovingScene& operator=(MovingScene&&) noexcept;
+    ~MovingScene();
+
+    /// The scene at `now` seconds, of which `until` ticks have begun. `slack`: how far times of
+    /// that moment may be off, in seconds. Else as SceneInTime::at().
+    [[nodiscard]] Result<Scene*> at(double now, std::uint64_t until, double slack);
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
 
 }  // namespace stx::mpeg4

@@ -360,14 +360,21 @@ void shiftTimes(Node& node, double seconds);
 [[nodiscard]] Result<Scene> composeScene(const std::vector<CommandFrame>& frames,
                                          std::uint64_t until = ~std::uint64_t{0});
 
+/// Whether a time-dependent node is active at a time of the scene, in seconds (ISO/IEC 14772-1,
+/// 4.6.9).
+using ActiveNode = std::function<bool(const Node& node, double now)>;
+
 /// The scene at one moment after another. Going on in time costs the commands between; going back
 /// starts anew.
 class SceneInTime {
   public:
     /// `frames` must outlive this. startTime and stopTime that come with an access unit count from
     /// its time: BIFS has no other clock (VRML's counts from 1970), and the one widely used player
-    /// does so. `timescale`: ticks a second of the frames; 0: they count from the scene's start.
-    explicit SceneInTime(const std::vector<CommandFrame>& frames, std::uint32_t timescale = 0);
+    /// does so. `timescale`: ticks a second of the frames; 0: not known, and times count from the
+    /// scene's start, as they do with `timesFromStart`. Where `active` tells which nodes are so, a
+    /// startTime, cycleInterval or speed that comes to one is ignored (14772-1, 4.6.9 and 6.28).
+    explicit SceneInTime(const std::vector<CommandFrame>& frames, std::uint32_t timescale = 0,
+                         bool timesFromStart = false, ActiveNode active = {});
     SceneInTime(SceneInTime&&) noexcept;
     SceneInTime& operator=(SceneInTime&&) noexcept;
     ~SceneInTime();
@@ -375,6 +382,18 @@ class SceneInTime {
     /// The scene after all commands with time <= `until`. It may be changed, as interpolators do,
     /// and lives until the next call. Errors as composeScene(), whose result this is.
     [[nodiscard]] Result<Scene*> at(std::uint64_t until);
+    /// Makes the next call start anew.
+    void restart();
+
+    /// When the first commands come that are not applied yet; nothing after the last.
+    [[nodiscard]] std::optional<std::uint64_t> next() const;
+    /// Numbers that change when commands change which DepthImages and textures of theirs are in the
+    /// scene, and which nodes its routes are between.
+    struct Structure {
+        std::uint64_t views = 0, routes = 0;
+        bool operator==(const Structure&) const = default;
+    };
+    [[nodiscard]] Structure structure() const;
 
   private:
     struct Impl;

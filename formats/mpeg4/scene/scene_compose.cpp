@@ -16,16 +16,58 @@ bool isMoment(const NodeInfo& node, int field) {
     return info.type == FieldType::SFTime && (info.name == "startTime" || info.name == "stopTime");
 }
 
+/// Whether a field takes no event while its node is active (ISO/IEC 14772-1, 6.28 and 6.50).
+bool isHeldWhileActive(const NodeInfo& node, int field) {
+    if (field < 0 || field >= static_cast<int>(node.fields.size())) return false;
+    const std::string& name = node.fields[field].name;
+    return name == "startTime" || name == "cycleInterval" || name == "speed";
+}
+
+/// Whether nodes with textures of views are in what an insertion brings.
+bool holdsViews(const FieldValue& value) {
+    bool holds = false;
+    if (const NodePtr* root = std::get_if<NodePtr>(&value))
+        forEachNode(*root, [&](const NodePtr& node) {
+            holds = holds || node->info->find("diTexture") >= 0;
+        });
+    return holds;
+}
+
+/// Counts what a command may change; it may be more than it does.
+void count(const Command& command, SceneInTime::Structure& structure) {
+    const auto isNodes = [](const FieldValue& value) {
+        return std::holds_alternative<NodePtr>(value) || std::holds_alternative<NodeList>(value);
+    };
+    const bool isRoute = std::holds_alternative<InsertRoute>(command) ||
+                         std::holds_alternative<DeleteRoute>(command) ||
+                         std::holds_alternative<ReplaceRoute>(command);
+    if (isRoute || std::holds_alternative<ReplaceScene>(command) ||
+        std::holds_alternative<ReplaceNode>(command) || std::holds_alternative<DeleteNode>(command))
+        ++structure.routes;
+    if (isRoute) return;
+    bool changes = true;
+    if (const auto* c = std::get_if<ReplaceField>(&command)) changes = isNodes(c->value);
+    if (const auto* c = std::get_if<ReplaceIndexed>(&command)) changes = isNodes(c->value);
+    // What comes anew takes nothing away.
+    if (const auto* c = std::get_if<InsertNode>(&command)) changes = holdsViews(c->node);
+    if (const auto* c = std::get_if<InsertIndexed>(&command)) changes = holdsViews(c->value);
+    if (changes) ++structure.views;
+}
+
 /// Node visits that all commands together may cost, so that a small hostile file cannot keep us
 /// busy: a scene of 10,000 nodes may be restructured some thousand times.
 constexpr std::uint64_t kMaxVisits = 20'000'000;
 
 class Composer {
   public:
-    /// Applies commands to what earlier calls left. `begin`: seconds that the times in their nodes
-    /// count from.
-    Result<void> run(std::vector<Command> commands, double begin) {
+    explicit Composer(const ActiveNode& active) : active_(active) {}
+
+    /// Applies commands of the time `now` to what earlier calls left. `begin`: seconds that the
+    /// times in their nodes count from.
+    Result<void> run(std::vector<Command> commands, double now, double begin) {
+        now_ = now;
         begin_ = begin;
+        findActive(commands);
         copyAll(commands);
         for (Command& command : commands) {
             ++count_;
@@ -37,6 +79,19 @@ class Composer {
     Scene& scene() { return scene_; }
 
   private:
+    /// Which nodes are active before commands of one time change them: what makes a node active
+    /// among these does so for them all.
+    void findActive(const std::vector<Command>& commands) {
+        wereActive_.clear();
+        if (!active_) return;
+        for (const Command& command : commands)
+            if (const auto* c = std::get_if<ReplaceField>(&command);
+                c != nullptr && c->target && isHeldWhileActive(*c->target->info, c->field))
+                if (const auto copy = copies_.find(c->target.get());
+                    copy != copies_.end() && active_(*copy->second, now_))
+                    wereActive_.insert(copy->second.get());
+    }
+
     // ---- copies
 
     void relink(NodePtr& node) const {
@@ -200,6 +255,10 @@ class Composer {
             return applyEvent(c);
         STX_CHECK(checkField(c.target, c.field));
         STX_CHECK(checkNotInside(c.target, c.value));
+        // One that a command before this has stopped takes it.
+        if (isHeldWhileActive(*c.target->info, c.field) && wereActive_.contains(c.target.get()) &&
+            active_(*c.target, now_))
+            return {};
         if (double* time = std::get_if<double>(&c.value);
             time != nullptr && isMoment(*c.target->info, c.field))
             *time += begin_;
@@ -303,7 +362,9 @@ class Composer {
     std::unordered_map<const Node*, NodePtr> copies_;
     std::uint64_t visits_ = 0;
     std::size_t count_ = 0;  ///< of commands
-    double begin_ = 0;
+    double now_ = 0, begin_ = 0;
+    const ActiveNode& active_;
+    std::unordered_set<const Node*> wereActive_;
 };
 
 }  // namespace
@@ -324,13 +385,18 @@ Result<Scene> composeScene(const std::vector<CommandFrame>& frames, std::uint64_
 struct SceneInTime::Impl {
     const std::vector<CommandFrame>& frames;
     std::uint32_t timescale;
+    bool timesFromStart;
+    ActiveNode active;
     std::vector<std::size_t> order;  ///< of frames, by time
     std::size_t next = 0;            ///< in order
+    Structure structure;
     std::unique_ptr<Composer> composer;
 };
 
-SceneInTime::SceneInTime(const std::vector<CommandFrame>& frames, std::uint32_t timescale)
-    : impl_(std::make_unique<Impl>(Impl{frames, timescale, {}, 0, nullptr})) {
+SceneInTime::SceneInTime(const std::vector<CommandFrame>& frames, std::uint32_t timescale,
+                         bool timesFromStart, ActiveNode active)
+    : impl_(std::make_unique<Impl>(
+          Impl{frames, timescale, timesFromStart, std::move(active), {}, 0, {}, nullptr})) {
     impl_->order.resize(frames.size());
     std::iota(impl_->order.begin(), impl_->order.end(), std::size_t{0});
     std::ranges::stable_sort(impl_->order, {}, [&](std::size_t i) { return frames[i].time; });
@@ -339,18 +405,35 @@ SceneInTime::SceneInTime(SceneInTime&&) noexcept = default;
 SceneInTime& SceneInTime::operator=(SceneInTime&&) noexcept = default;
 SceneInTime::~SceneInTime() = default;
 
+void SceneInTime::restart() {
+    impl_->composer.reset();
+    impl_->next = 0;
+}
+
+std::optional<std::uint64_t> SceneInTime::next() const {
+    if (impl_->next >= impl_->order.size()) return {};
+    return impl_->frames[impl_->order[impl_->next]].time;
+}
+
+SceneInTime::Structure SceneInTime::structure() const {
+    return impl_->structure;
+}
+
 Result<Scene*> SceneInTime::at(std::uint64_t until) {
     Impl& i = *impl_;
     const bool back = i.next > 0 && i.frames[i.order[i.next - 1]].time > until;
     if (!i.composer || back) {
-        i.composer = std::make_unique<Composer>();
+        i.composer = std::make_unique<Composer>(i.active);
         i.next = 0;
+        ++i.structure.views;
+        ++i.structure.routes;
     }
     for (; i.next < i.order.size() && i.frames[i.order[i.next]].time <= until; ++i.next) {
         const CommandFrame& frame = i.frames[i.order[i.next]];
-        const double begin = i.timescale == 0 ? 0 : static_cast<double>(frame.time) / i.timescale;
-        if (auto done = i.composer->run(frame.commands, begin); !done) {
-            i.composer.reset();
+        const double now = i.timescale == 0 ? 0 : static_cast<double>(frame.time) / i.timescale;
+        for (const Command& command : frame.commands) count(command, i.structure);
+        if (auto done = i.composer->run(frame.commands, now, i.timesFromStart ? 0 : now); !done) {
+            restart();
             return tl::unexpected(done.error());
         }
     }

@@ -1,5 +1,7 @@
 #include "formats/mpeg4/scene/scene_walk.hpp"
 
+#include <unordered_map>
+
 namespace stx::mpeg4 {
 namespace {
 
@@ -26,6 +28,7 @@ class Walker {
             return fail(ErrorCode::invalidInput, "nodes nest deeper than {}", limits_.maxNesting);
         const std::string& type = node->info->name;
         if (node->proto) {
+            if (holdsClock(*node->proto)) scene_.withClocks.insert(type);
             std::size_t copied = 0;
             const NodePtr body = bodyOf(*node, copied);
             visits_ += static_cast<std::int64_t>(copied);
@@ -75,6 +78,26 @@ class Walker {
         return {};
     }
 
+    /// Whether a TimeSensor is in a PROTO or in those that it uses.
+    bool holdsClock(const Proto& proto) {
+        const auto [known, isNew] = clocks_.try_emplace(&proto, false);
+        if (!isNew) return known->second;
+        std::vector<const Proto*> open{&proto};
+        std::unordered_set<const Proto*> seen{&proto};
+        while (!open.empty()) {
+            const Proto& next = *open.back();
+            open.pop_back();
+            for (const NodePtr& node : next.body)
+                forEachNode(node, [&](const NodePtr& inside) {
+                    ++visits_;
+                    if (inside->is("TimeSensor")) known->second = true;
+                    if (inside->proto && seen.insert(inside->proto.get()).second)
+                        open.push_back(inside->proto.get());
+                });
+        }
+        return known->second;
+    }
+
     /// Settings, clocks and what they drive show nothing by themselves.
     static bool isSetting(std::string_view type) {
         for (const std::string_view setting : {"QuantizationParameter", "Viewpoint", "Viewport",
@@ -114,6 +137,7 @@ class Walker {
     std::vector<const Node*> path_;        ///< from the root to the node that is visited
     glm::dquat turn_{1.0, 0.0, 0.0, 0.0};  ///< of all Transforms above the node that is visited
     std::int64_t visits_ = 0;
+    std::unordered_map<const Proto*, bool> clocks_;  ///< whether one is inside
     int groups_ = 0;
 };
 

@@ -43,6 +43,8 @@ struct ShownScene {
     std::set<std::string> leftOut;  ///< types of nodes that are no views, groups or settings
     /// Types of grouping nodes that turn, move or choose their children; read as plain groups.
     std::set<std::string> asGroups;
+    /// PROTOs of which instances are shown, and that have TimeSensors inside.
+    std::set<std::string> withClocks;
 };
 [[nodiscard]] Result<ShownScene> shownScene(const NodePtr& root, const Limits& limits);
 

@@ -1,0 +1,342 @@
+// When a film changes that commands, clocks and object descriptors change together, and to what.
+
+#include <gtest/gtest.h>
+
+#include "formats/images/images.hpp"
+#include "formats/mpeg4/mapping/media_clock.hpp"
+#include "formats/mpeg4/mapping/scene_sequence.hpp"
+#include "formats/mpeg4/text/bt.hpp"
+
+using namespace stx;
+using namespace stx::mpeg4;
+
+namespace {
+
+/// Seconds of the film and what it shows then.
+using Shown = std::vector<std::pair<double, double>>;
+
+Document readText(const std::string& text) {
+    Job job;
+    auto document = readBt(text, "test.bt", job);
+    if (!document) ADD_FAILURE() << document.error().text() << "\n" << text;
+    return document ? std::move(*document) : Document();
+}
+
+/// A view at x -1 that a clock moves from 0 to 4 in one cycle.
+Document moved(const std::string& clock, const std::string& commands = "",
+               const std::string& more = "") {
+    return readText(R"(Group { children [ DEF TR Transform { translation -1 0 0 children [
+DepthImage { orthographic FALSE position 0 0 0 diTexture SimpleTexture {
+    depth PixelTexture { image 1 1 1 200 } } } ] }
+DEF TS TimeSensor { )" +
+                    clock + R"( }
+DEF PI PositionInterpolator { key [0 1] keyValue [0 0 0, 4 0 0] } )" +
+                    more + R"( ] }
+ROUTE TS.fraction_changed TO PI.set_fraction
+DEF RR ROUTE PI.value_changed TO TR.translation
+)" + commands);
+}
+
+/// A stream of pictures of one grey each: `greys` in turn, half a second long.
+ElementaryStream pictures(const std::vector<std::uint8_t>& greys) {
+    ElementaryStream stream;
+    stream.objectTypeIndication = oti::kPng;
+    stream.streamType = StreamType::visual;
+    for (const std::uint8_t grey : greys) {
+        const std::uint8_t rgb[] = {grey, grey, grey};
+        auto png = encodePng(1, 1, 3, 8, rgb, true);
+        if (!png) ADD_FAILURE() << png.error().text();
+        Sample sample;
+        sample.data = ByteRange::of(std::move(*png));
+        sample.time = 500 * stream.samples.size();
+        sample.duration = 500;
+        stream.samples.push_back(sample);
+    }
+    return stream;
+}
+
+void addStream(Document& document, double time, ElementaryStream stream) {
+    OdFrame frame;
+    frame.time = ticksAt(time, document.odStream.timescale);
+    ObjectDescriptor descriptor;
+    descriptor.id = 10;
+    descriptor.streams = {std::move(stream)};
+    frame.commands.push_back(UpdateObjectDescriptors{{descriptor}});
+    document.odFrames.push_back(frame);
+}
+
+/// A view whose colours are a film of six pictures: grey 0, 40, ... 200.
+Document film(const std::string& movie, const std::string& commands = "") {
+    Document document = readText(R"(Group { children [ DEF TR Transform { children [
+DepthImage { orthographic FALSE position 0 0 0 diTexture SimpleTexture {
+    depth PixelTexture { image 1 1 1 200 } texture DEF MT MovieTexture { url [od:10] )" +
+                                 movie + R"( } } } ] } ] }
+)" + commands);
+    addStream(document, 0, pictures({0, 40, 80, 120, 160, 200}));
+    return document;
+}
+
+std::unique_ptr<Sequence> opened(Document document) {
+    Job job;
+    auto sequence = sequenceFromScene(std::move(document), {}, job);
+    if (!sequence) ADD_FAILURE() << sequence.error().text();
+    return sequence ? std::move(*sequence) : nullptr;
+}
+
+Bundle frameAt(Sequence& sequence, double time) {
+    Job job;
+    auto frame = sequence.frame(sequence.timeline().frameAt(time), job);
+    if (!frame) ADD_FAILURE() << frame.error().text();
+    return frame ? std::move(*frame) : Bundle();
+}
+
+/// Expects the view at some x; in any order.
+void expectPlaces(Document document, const Shown& shown, double tolerance = 1e-5) {
+    const auto sequence = opened(std::move(document));
+    ASSERT_TRUE(sequence);
+    const auto expect = [&](const std::pair<double, double>& at) {
+        const Bundle frame = frameAt(*sequence, at.first);
+        ASSERT_EQ(frame.views.size(), 1u);
+        EXPECT_NEAR(frame.views[0].camera.position.x, at.second, tolerance) << at.first << " s";
+    };
+    for (const auto& at : shown) expect(at);
+    for (auto at = shown.rbegin(); at != shown.rend(); ++at) expect(*at);
+}
+
+/// Expects a picture of film() by its number.
+void expectPictures(Document document, const Shown& shown) {
+    const auto sequence = opened(std::move(document));
+    ASSERT_TRUE(sequence);
+    for (const auto& [time, number] : shown) {
+        const Bundle frame = frameAt(*sequence, time);
+        ASSERT_EQ(frame.views.size(), 1u);
+        EXPECT_EQ(frame.views[0].texture.rgba8()->at(0, 0).r, 40 * number) << time << " s";
+    }
+}
+
+}  // namespace
+
+TEST(SceneClocks, RunWhenCommandsStartThem) {
+    const auto started = [] {
+        return moved("cycleInterval 4 startTime 100", "AT 1000 { REPLACE TS.startTime BY 0 }");
+    };
+    expectPlaces(started(), {{0, -1}, {1, 0}, {2, 1}, {3, 2}, {4, 3}, {5, 4}});
+    const auto sequence = opened(started());
+    ASSERT_TRUE(sequence);
+    EXPECT_EQ(sequence->timeline().count(), 102u) << "of the start that never comes, none";
+    EXPECT_NEAR(sequence->timeline().times.back(), 5, 1e-9);
+
+    expectPlaces(moved("cycleInterval 4 startTime 100",
+                       "AT 1000 { REPLACE TS.startTime BY 0 } AT 3000 { REPLACE PI.key BY [0 1] }"),
+                 {{0, -1}, {1, 0}, {2, 1}, {3, 2}, {4, 3}, {5, 4}});
+    expectPlaces(moved("cycleInterval 4 enabled FALSE", "AT 2000 { REPLACE TS.enabled BY TRUE }"),
+                 {{0, -1}, {2, 2}, {3, 3}, {4, 4}});
+}
+
+TEST(SceneClocks, RunAgainWhenCommandsRestartThem) {
+    expectPlaces(moved("cycleInterval 4", "AT 6000 { REPLACE TS.startTime BY 0 }"),
+                 {{0, 0}, {2, 2}, {4, 4}, {5, 4}, {6, 0}, {7, 1}, {8, 2}, {10, 4}});
+    // At the very end, which doubles may miss: 1.1 + 4.3 is more than 5.4.
+    expectPlaces(moved("cycleInterval 4.3 startTime 1.1", "AT 5400 { REPLACE TS.startTime BY 0 }"),
+                 {{5.38, 4}, {5.4, 0}, {9.7, 4}}, 0.03);
+}
+
+TEST(SceneClocks, LoopAsLongAsElseSomethingLasts) {
+    expectPlaces(moved("cycleInterval 4 loop TRUE", "AT 9000 { REPLACE PI.key BY [0 1] }"),
+                 {{1, 1}, {3, 3}, {5, 1}, {6, 2}, {7, 3}, {9, 1}, {9.8, 1.8}, {11.96, 3.96}});
+    expectPlaces(moved("cycleInterval 2 loop TRUE stopTime 5"),
+                 {{1, 2}, {3, 2}, {4.52, 1.04}, {5, 2}});
+    // Another clock, and the cycle that is under way at its end.
+    const auto sequence = opened(moved("cycleInterval 4 loop TRUE", "", R"(
+DEF T2 TimeSensor { cycleInterval 9 } DEF P2 PositionInterpolator { } )"));
+    ASSERT_TRUE(sequence);
+    EXPECT_NEAR(sequence->timeline().end, 4, 1e-9) << "no route leaves the other";
+    Document both =
+        moved("cycleInterval 4 loop TRUE", "ROUTE T2.fraction_changed TO P2.set_fraction",
+              "DEF T2 TimeSensor { cycleInterval 9 } DEF P2 PositionInterpolator { }");
+    EXPECT_NEAR(opened(std::move(both))->timeline().end, 12, 1e-9);
+}
+
+TEST(SceneClocks, LeaveTheirLastValueBehind) {
+    const std::string clock = "cycleInterval 4";
+    expectPlaces(moved(clock, "AT 5000 { REPLACE TR.translation BY 9 0 0 }"),
+                 {{0, 0}, {2, 2}, {4, 4}, {5, 9}, {6, 9}});
+    // A command at the end comes after the clock's last value.
+    expectPlaces(moved(clock, "AT 4000 { REPLACE TR.translation BY 9 0 0 }"), {{3, 3}, {4, 9}});
+    for (const char* command : {"DELETE ROUTE RR", "REPLACE TS.enabled BY FALSE", "DELETE TS",
+                                "REPLACE TS.stopTime BY 0"})
+        expectPlaces(moved(clock, "AT 2000 { " + std::string(command) +
+                                      " } AT 3500 { REPLACE TR.rotation BY 0 0 1 0 }"),
+                     {{0, 0}, {1, 1}, {1.96, 1.96}, {2, 2}, {3, 2}, {3.6, 2}});
+    // While it runs, it sends on.
+    expectPlaces(moved(clock, "AT 2000 { REPLACE TR.translation BY 9 0 0 }"),
+                 {{1, 1}, {2.04, 2.04}});
+}
+
+TEST(SceneClocks, OneAfterTheOtherDriveTheSame) {
+    expectPlaces(moved("cycleInterval 2", "ROUTE T2.fraction_changed TO PI.set_fraction",
+                       "DEF T2 TimeSensor { cycleInterval 4 startTime 3 }"),
+                 {{1, 2}, {2, 4}, {2.96, 4}, {4, 1}, {5, 2}, {7, 4}});
+}
+
+TEST(SceneClocks, KeepTheirStartAndCycleWhileActive) {
+    for (const char* command : {"REPLACE TS.startTime BY 0", "REPLACE TS.cycleInterval BY 8"})
+        expectPlaces(moved("cycleInterval 4", "AT 2000 { " + std::string(command) + " }"),
+                     {{1, 1}, {1.96, 1.96}, {2, 2}, {3, 3}, {4, 4}});
+    // Not when a command before, of the same time, has stopped them.
+    expectPlaces(
+        moved("cycleInterval 4", "AT 2000 { REPLACE TS.stopTime BY 0 REPLACE TS.startTime BY 0 }"),
+        {{1, 1}, {2, 0}, {3, 1}, {6, 4}});
+    // Nor when one of the same time would start them.
+    expectPlaces(moved("cycleInterval 4",
+                       "AT 6000 { REPLACE TS.cycleInterval BY 8 REPLACE TS.startTime BY 0 }"),
+                 {{4, 4}, {5, 4}, {6, 0}, {8, 1}, {14, 4}});
+}
+
+TEST(SceneClocks, MoviesRunWhenCommandsStartThem) {
+    const auto started = [] {
+        return film("startTime 100", "AT 1000 { REPLACE MT.startTime BY 0 }");
+    };
+    expectPictures(started(), {{.6, 0}, {1.1, 0}, {1.6, 1}, {2.1, 2}, {2.6, 3}, {3.6, 5}});
+    EXPECT_NEAR(opened(started())->timeline().end, 4, 1e-9);
+}
+
+TEST(SceneClocks, MoviesLoopAsLongAsElseSomethingLasts) {
+    expectPictures(film("loop TRUE", "AT 7000 { REPLACE TR.rotation BY 0 0 1 0.0001 }"),
+                   {{.6, 1}, {2.6, 5}, {3.1, 0}, {3.6, 1}, {4.6, 3}, {6.6, 1}, {7.1, 2}, {8.1, 4}});
+    EXPECT_NEAR(opened(film("loop TRUE"))->timeline().end, 3, 1e-9);
+}
+
+TEST(SceneClocks, MoviesKeepTheirStartAndSpeedWhileActive) {
+    const Shown asBefore = {{.6, 1}, {1.1, 2}, {1.6, 3}, {2.1, 4}, {2.6, 5}};
+    expectPictures(film("", "AT 1000 { REPLACE MT.speed BY 2 }"), asBefore);
+    expectPictures(film("", "AT 1200 { REPLACE MT.startTime BY 0 }"), asBefore);
+    expectPictures(film("", "AT 3000 { REPLACE MT.speed BY 2 REPLACE MT.startTime BY 0 }"),
+                   {{2.6, 5}, {3.1, 0}, {3.3, 1}, {4.4, 5}});
+}
+
+TEST(SceneClocks, MoviesRunBackToTheirFirstPicture) {
+    for (const float speed : {1.0f, 2.0f}) {
+        const auto at = [&](double seconds) { return seconds / speed; };
+        expectPictures(film("speed -" + std::to_string(speed)), {{at(.1), 5},
+                                                                 {at(.6), 4},
+                                                                 {at(1.1), 3},
+                                                                 {at(1.6), 2},
+                                                                 {at(2.1), 1},
+                                                                 {at(2.6), 0},
+                                                                 {at(2.9), 0},
+                                                                 {at(3.5), 0}});
+    }
+}
+
+TEST(SceneClocks, ObjectDescriptorsActAtTheirTime) {
+    for (const char* commands : {"", "AT 2000 { REPLACE TR.rotation BY 0 0 1 0.0001 }"}) {
+        Document document = film("", commands);
+        document.odFrames.clear();
+        addStream(document, 0, pictures({40}));
+        addStream(document, 1, pictures({80}));
+        const auto count = document.frames.size() + 1;
+        document.odFrames[1].commands.insert(document.odFrames[1].commands.begin(),
+                                             RemoveObjectDescriptors{{10}});
+        expectPictures(document, {{.5, 1}, {1.5, 2}, {2.5, 2}, {.5, 1}});
+        EXPECT_EQ(opened(document)->timeline().count(), count);
+    }
+    // One that no texture has changes nothing.
+    Document document = film("");
+    document.odFrames.clear();
+    addStream(document, 0, pictures({40}));
+    addStream(document, 1, pictures({80}));
+    std::get<UpdateObjectDescriptors>(document.odFrames[1].commands[0]).descriptors[0].id = 11;
+    EXPECT_EQ(opened(document)->timeline().count(), 1u);
+}
+
+TEST(SceneClocks, MoviesComeAndGoWithTheirNodes) {
+    Document document = readText(R"(DEF G Group { children [ Group { } ] }
+AT 500 { APPEND TO G.children Group { } }
+AT 1000 { APPEND TO G.children DEF V DepthImage { diTexture SimpleTexture {
+    depth DEF MT MovieTexture { url [od:10] } } } }
+AT 2000 { DELETE V }
+)");
+    addStream(document, 0, pictures({0, 40, 80, 120, 160, 200}));
+    Job job;
+    const auto images = StreamImages::make(document, {}, job.limits);
+    ASSERT_TRUE(images);
+    const auto line = timelineOf(document, *images);
+    ASSERT_TRUE(line) << line.error().text();
+    EXPECT_EQ(line->times, (std::vector<double>{0, 0.5, 1, 1.5, 2}));
+}
+
+TEST(SceneClocks, RunOnWherePicturesHaveEnded) {
+    // While pictures run, theirs are the moments.
+    Document document = moved("cycleInterval 4", "", R"(
+DepthImage { orthographic FALSE diTexture SimpleTexture { depth PixelTexture { image 1 1 1 200 }
+    texture MovieTexture { url [od:10] } } } )");
+    addStream(document, 0, pictures({0, 40, 80, 120, 160, 200}));
+    const auto sequence = opened(document);
+    ASSERT_TRUE(sequence);
+    const Timeline& line = sequence->timeline();
+    EXPECT_EQ(line.count(), 6u + 26u);
+    EXPECT_NEAR(line.times.back(), 4, 1e-9);
+}
+
+TEST(SceneClocks, WhatTheyDoNotMoveIsNoted) {
+    const auto noteOf = [](const Document& document) {
+        Job job;
+        EXPECT_TRUE(bundleFromScene(document, {}, job));
+        for (const std::string& note : job.takeNotes())
+            if (note.find("not followed") != std::string::npos) return note;
+        return std::string();
+    };
+    EXPECT_EQ(noteOf(moved("cycleInterval 4")), "");
+    const std::string start = "clocks move nothing through these, which are not followed: ";
+    const auto with = [](const std::string& nodes, const std::string& routes,
+                         const std::string& protos = "") {
+        return readText(protos + R"(Group { children [ DEF TR Transform { children [
+DepthImage { diTexture SimpleTexture { depth PixelTexture { image 1 1 1 200 } } } ] }
+DEF TS TimeSensor { } DEF PI PositionInterpolator { } )" +
+                        nodes + " ] }\n" + routes);
+    };
+    EXPECT_EQ(noteOf(with("DEF V Valuator { }",
+                          "ROUTE TS.fraction_changed TO V.inSFFloat "
+                          "ROUTE V.outSFVec3f TO TR.translation")),
+              start + "TimeSensor.fraction_changed TO Valuator.inSFFloat");
+    EXPECT_EQ(noteOf(with("DEF T2 TimeSensor { }", "ROUTE T2.cycleTime TO TS.startTime")),
+              start + "TimeSensor.cycleTime TO TimeSensor.startTime");
+    // At the end of a chain.
+    EXPECT_EQ(noteOf(with("DEF N Transform { } DEF V Valuator { }",
+                          "ROUTE TS.fraction_changed TO PI.set_fraction "
+                          "ROUTE PI.value_changed TO N.translation "
+                          "ROUTE N.translation TO V.inSFVec3f")),
+              start + "Transform.translation TO Valuator.inSFVec3f");
+    // What no clock reaches.
+    EXPECT_EQ(noteOf(with("DEF V Valuator { }", "ROUTE V.outSFVec3f TO TR.translation")), "");
+
+    const std::string mover = R"(PROTO Mover [ eventIn SFFloat fr exposedField SFVec3f at 0 0 0 ] {
+    Transform { translation IS at children [ PositionInterpolator { set_fraction IS fr } ] } }
+)";
+    EXPECT_EQ(noteOf(with("DEF M Mover { }", "ROUTE TS.fraction_changed TO M.fr", mover)),
+              start + "TimeSensor.fraction_changed TO Mover.fr");
+    EXPECT_EQ(noteOf(with("DEF M Mover { }",
+                          "ROUTE TS.fraction_changed TO PI.set_fraction "
+                          "ROUTE PI.value_changed TO M.at",
+                          mover)),
+              "");
+    const std::string clock = "PROTO Clock [ ] { Group { children [ TimeSensor { } ] } }\n";
+    EXPECT_EQ(noteOf(with("Clock { }", "", clock)), start + "TimeSensor inside of PROTO Clock");
+    EXPECT_EQ(noteOf(with("Outer { }", "",
+                          clock + "PROTO Outer [ ] { Group { children [ Clock { } ] } }\n")),
+              start + "TimeSensor inside of PROTO Clock, TimeSensor inside of PROTO Outer");
+    EXPECT_EQ(noteOf(with("", "", clock)), "") << "no instance";
+}
+
+TEST(MediaClock, DwellsOnAPicture) {
+    // media_rate 0: ISO/IEC 14496-12, 8.6.6.
+    ElementaryStream stream = pictures({0, 40, 80, 120, 160, 200});
+    stream.edits = {1000, {{1000, 1000, 0}, {1000, 0, 0x10000}}};
+    const Presentation shown = presentationOf(stream);
+    std::vector<std::size_t> samples;
+    for (const double time : {.1, .4, .6, .9, 1.1, 1.6})
+        samples.push_back(shown.sampleAt(time, 1e-6));
+    EXPECT_EQ(samples, (std::vector<std::size_t>{2, 2, 2, 2, 0, 1}));
+    EXPECT_NEAR(shown.duration, 2, 1e-9);
+}
