@@ -528,6 +528,12 @@ Result<fs::path> findInside(const fs::path& folder, std::string_view name, const
 
     std::error_code ec;
     const fs::path base = folder.empty() ? fs::path(".") : folder;
+    // That of /dev/stdin, where no file is beside what comes in.
+    if (base == "/dev" && fs::path(name).is_relative())
+        return fail(ErrorCode::io,
+                    "'{}' lies beside the file that names it, and standard input has no folder; "
+                    "give that file's name in place of -",
+                    name.substr(0, 200));
     // Nearly all names are of this kind.
     if (auto plain = plainFile(base.native(), name)) return *std::move(plain);
     std::string spelled(name);

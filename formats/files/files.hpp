@@ -83,7 +83,8 @@ class OutputFolder {
 
 /// The file that `name`, found inside a bundle, set or model in `folder`, stands for. Errors
 /// (invalidInput) when it is absolute, has a URL scheme, leaves the folder by `..` or a link, or is
-/// not a regular file, unless limits.allowOutside; (io) when it does not exist.
+/// not a regular file, unless limits.allowOutside; (io) when it does not exist, or the folder is
+/// that of standard input (/dev).
 [[nodiscard]] Result<std::filesystem::path> resolveInside(const std::filesystem::path& folder,
                                                           std::string_view name,
                                                           const Limits& limits);
