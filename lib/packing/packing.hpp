@@ -40,7 +40,7 @@ struct PackSettings {
     std::int64_t sourcePixels = 0;
     /// Memory that writing takes beside the pages, bytes a pixel; nothing: the most of any
     /// container.
-    std::optional<std::uint64_t> bytesToWrite;
+    std::optional<std::uint64_t> bytesToWrite{};
     /// Of frames that are packed alike (PackPeriod::content()): the tight layout goes by these
     /// views, in number and size those of the bundle; null = by the bundle itself.
     const Bundle* contentOf = nullptr;
