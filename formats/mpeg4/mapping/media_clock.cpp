@@ -1,9 +1,9 @@
 #include "formats/mpeg4/mapping/media_clock.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
-#include <ranges>
 
 #include "lib/model/sequence.hpp"
 
@@ -138,9 +138,10 @@ bool addChanges(const Node& texture, const Presentation& stream, double from, do
     for (double cycle = std::max(0.0, std::floor((from - run->start) / run->cycle));; ++cycle) {
         const double start = run->start + cycle * run->cycle;
         if (!(start < until)) return true;
-        const auto numbers = std::views::iota(std::size_t{0}, count);
-        auto i = *std::ranges::lower_bound(numbers, from, {},
-                                           [&](std::size_t k) { return start + after(k); });
+        // How many pictures come before `from`; times ascend.
+        std::size_t i = 0;
+        for (std::size_t step = std::bit_ceil(count); step > 0; step /= 2)
+            if (i + step <= count && start + after(i + step - 1) < from) i += step;
         // The first picture is shown from where the cycle begins.
         if (cycle > 0 && start >= from) times.push_back(start);
         for (; i < count && start + after(i) < until && after(i) < run->cycle; ++i) {
