@@ -80,8 +80,9 @@ class Walker {
 
     /// Whether a TimeSensor is in a PROTO or in those that it uses.
     bool holdsClock(const Proto& proto) {
-        const auto [known, isNew] = clocks_.try_emplace(&proto, false);
-        if (!isNew) return known->second;
+        const auto known = clocks_.try_emplace(&proto, false);
+        bool& holds = known.first->second;
+        if (!known.second) return holds;
         std::vector<const Proto*> open{&proto};
         std::unordered_set<const Proto*> seen{&proto};
         while (!open.empty()) {
@@ -90,12 +91,12 @@ class Walker {
             for (const NodePtr& node : next.body)
                 forEachNode(node, [&](const NodePtr& inside) {
                     ++visits_;
-                    if (inside->is("TimeSensor")) known->second = true;
+                    if (inside->is("TimeSensor")) holds = true;
                     if (inside->proto && seen.insert(inside->proto.get()).second)
                         open.push_back(inside->proto.get());
                 });
         }
-        return known->second;
+        return holds;
     }
 
     /// Settings, clocks and what they drive show nothing by themselves.
