@@ -12,6 +12,7 @@
 #include "lib/base/cpu_clock.hpp"
 #include "lib/base/median.hpp"
 #include "lib/capture/capture.hpp"
+#include "lib/model/depth_values.hpp"
 #include "lib/refine/align.hpp"
 #include "lib/refine/gaps.hpp"
 #include "lib/refine/mixed.hpp"
@@ -172,7 +173,7 @@ Result<StoredView> readImages(const SetView& set, const ImageSetOptions& options
     return stored;
 }
 
-/// Codes of 16 bits are fine enough where a step of them is no more than this share of a pixel's
+/// Codes of 16 bits are fine enough where a step of them is at most this share of a pixel's
 /// size at the nearest point. Two spheres before a far value: a share of 0.1 gives 42.9 dB (floats
 /// 42.7), of 1 31.2 dB, of 60 25.9 dB.
 constexpr double kFineStep = 0.25;
@@ -200,16 +201,15 @@ void setPlanes(ReferenceView& view, const SetView& set, const ImageSetOptions& o
             view.farPlane = set.planes->farPlane;
             view.depthBits = set.depthBits;
             if (set.depthBits == 32) return;
-            const DepthCode code = view.depthCode();
-            for (float& d : view.depth.pixels())
-                if (hasPoint(d)) d = static_cast<float>(code.decode(code.encode(d)));
+            roundToCode(view.depth.pixels(), view.depthCode());
             return;
         }
     }
-    view.depthBits = 32;
+    view.depthBits = 32;  // nothing is rounded before the planes tell how coarse codes would be
     fitDepthRange(view);
     view.depthBits = bitsFor(view, options);
-    if (view.depthBits < 32 && options.roundFrames) fitDepthRange(view);
+    if (view.depthBits < 32 && options.roundFrames)
+        roundToCode(view.depth.pixels(), view.depthCode());
     if (view.depthBits == 8 && options.roundFrames)
         job.note(fmt::format(
             "view '{}': depth in 8 bits is exact to {:.3g} scene units (16 bits: "

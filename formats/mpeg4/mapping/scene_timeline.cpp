@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <unordered_set>
 
 #include "formats/mpeg4/mapping/media_clock.hpp"
@@ -20,7 +19,6 @@ constexpr double kSmoothRate = 25;
 constexpr std::uint64_t kMaxVisits = 20'000'000;
 /// Textures and clocks that are asked again in the time that one node is walked (0.5 and 0.05 us).
 constexpr std::uint64_t kAskedPerVisit = 10;
-constexpr double kEver = std::numeric_limits<double>::infinity();
 
 /// Seconds, from `begin` and before `end`.
 struct Span {
@@ -224,7 +222,7 @@ class Moments {
 
 double ownStart(const Scene& scene, const Limits& limits) {
     const auto shown = shownScene(scene.root, limits);
-    if (!shown) return 0;  // what is wrong is told when a frame is read
+    if (!shown) return 0;  // reading a frame gives the error
     for (const ShownInfo& info : shown->infos)
         if (const auto start = ViewNotes::parse(info.text).start) return *start;
     return 0;

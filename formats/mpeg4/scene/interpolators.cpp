@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -137,8 +136,6 @@ class Events {
     std::vector<std::uint64_t> done_;  ///< the stamp at which each route has worked last
     std::unordered_map<const Node*, std::vector<std::size_t>> from_;
 };
-
-constexpr double kEver = std::numeric_limits<double>::infinity();
 
 }  // namespace
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -11,11 +12,14 @@
 /// much of their cycle has passed along ROUTEs to interpolators, which send values to fields.
 namespace stx::mpeg4 {
 
+/// The end of what runs for ever.
+inline constexpr double kEver = std::numeric_limits<double>::infinity();
+
 /// How a time-dependent node runs by its fields (ISO/IEC 14772-1, 4.6.9); seconds of the scene.
 struct ClockRun {
     double start = 0;
     double cycle = 0;  ///< above 0
-    double end = 0;    ///< when it becomes inactive; infinite where it loops and does not stop
+    double end = 0;    ///< when it becomes inactive; kEver where it loops and does not stop
 
     /// A stopTime counts only after the start.
     ClockRun(double startTime, double cycleSeconds, bool loop, double stopTime);

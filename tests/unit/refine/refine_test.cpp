@@ -278,7 +278,7 @@ TEST(Refine, WhatWasPrunedIsNotMissing) {
     const auto pruning = prune(pruned, {}, job);
     ASSERT_TRUE(pruning) << pruning.error().text();
     ASSERT_LT(pruning->keptPixels, pruning->sourcePixels);
-    // Alone amid what was pruned: it is no speck of dust.
+    // Alone amid what was pruned: it is not a speck of dust.
     ReferenceView& view = pruned.views[0];
     for (int y = 38; y <= 42; ++y)
         for (int x = 38; x <= 42; ++x)
