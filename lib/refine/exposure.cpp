@@ -5,11 +5,13 @@
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
 
 #include "lib/base/parallel.hpp"
+#include "lib/geometry/bounds.hpp"
 #include "lib/geometry/depth_code.hpp"
 #include "lib/geometry/near_views.hpp"
 
@@ -22,17 +24,18 @@ constexpr double kPoints = 600, kPointsOfLeaves = 5000, kRankPoints = 40;
 constexpr std::size_t kFewInside = 60;
 /// Views of fewer pixels are left alone: each pixel is so large a part of what is shown that
 /// colours differ by where it samples. A ball in exact views of 19x16 was taken for lit otherwise,
-/// 2.4 times as clearly as is asked for, and a room in such of 19x14; of 29 cases of tests/sweep
-/// with larger views the clearest has 0.43.
-constexpr std::int64_t kFewPixels = 1000;
+/// 2.4 times as clearly as is asked for, a room in such of 19x14 and a torus in such of 41x36; of
+/// 29 cases of tests/sweep with larger views the clearest has 0.43.
+constexpr std::int64_t kFewPixels = 2000;
 /// Views that a view is compared with: those that show most of it.
 constexpr std::size_t kComparedWith = 8;
 /// Views that show less of each other are not compared.
 constexpr int kLeastShown = 2;
 /// Surfaces are seen from the front when the cosine to their normal is larger.
 constexpr double kFromTheFront = 0.2;
-/// The same surface: depths that differ by no more than this share. Noise may be more; then fewer
-/// points are left.
+/// The same surface: depths that differ by no more than this share of them, or of the size of all
+/// that is shown where that is less: from far away both sides of an object are at one depth. Noise
+/// may be more; then fewer points are left.
 constexpr double kSamePlace = 0.015;
 /// Where colours of 3x3 pixels range over more than this share of their mean and this, sampling
 /// tells more than light.
@@ -71,6 +74,14 @@ class Samples {
             }
         }
         return points;
+    }
+
+    /// Called before shownAt(), with the points of all views.
+    void setSizeOf(const ColourPoints& views) {
+        Bounds all;
+        for (const auto& points : views)
+            for (const ColourPoint& point : points) all.add(point.world);
+        size_ = 2 * all.radius();
     }
 
     /// What a view shows of a point; nothing when something else is there.
@@ -114,7 +125,8 @@ class Samples {
         if (!part.texture) return {};
         const auto isAt = [&](std::size_t texel, double share) {
             const double there = part.depth->data()[texel];
-            return hasPoint(static_cast<float>(there)) && std::abs(there - depth) < share * depth;
+            return hasPoint(static_cast<float>(there)) &&
+                   std::abs(there - depth) < share * std::min(depth, size_);
         };
         if (!isAt(part.texel(x, y), kSamePlace)) return {};
         glm::vec4 sum(0), low(1e9f), high(-1e9f);
@@ -138,6 +150,7 @@ class Samples {
     const PartOfView& partOf_;
     int radius_;
     std::vector<glm::dmat4> cameraFromWorld_;
+    double size_ = std::numeric_limits<double>::infinity();  ///< of all that is shown
 };
 
 /// Views that are compared with each other, by pairs, a < b: of each those that show most of it.
@@ -192,6 +205,7 @@ class SharedColoursFinder {
                     each_([&](std::size_t v) { points_[v] = samples_.pointsOf(v); }));
             if (!all) return std::nullopt;
         }
+        samples_.setSizeOf(points_);
         // How much of each view another shows.
         const auto lookFor = viewsToLookFor(
             points_.size(), [&](std::size_t v) -> const Camera& { return cameras_[v]; },

@@ -230,6 +230,31 @@ TEST(Exposure, ViewsAreReadTwice) {
     }
 }
 
+TEST(Exposure, FromFarAwayWhatIsBehindASurfaceIsAnother) {
+    // A camera far away shows a wall, one between the two shows a darker wall one unit behind it.
+    Bundle bundle;
+    for (const auto& [distance, brightness] : {std::pair(100.0, 200.0f), std::pair(0.5, 120.0f)}) {
+        ReferenceView& view = bundle.views.emplace_back();
+        Camera& c = view.camera;
+        c.width = c.height = 64;
+        c.fx = c.fy = 16 * distance;
+        c.cx = c.cy = 32;
+        c.position.z = distance > 1 ? distance : -0.5;
+        view.depth = Image<float>(64, 64, static_cast<float>(distance));
+        Rgba8Image colours(64, 64);
+        for (int i = 0; i < 64 * 64; ++i) {
+            const auto change = [&](int period) { return static_cast<float>(i / period % 8) / 16; };
+            colours.data()[i] = glm::u8vec4(
+                glm::u8vec3(brightness * glm::vec3(0.5f + change(8), 0.5f + change(512), 0.7f)),
+                255);
+        }
+        view.texture = std::move(colours);
+    }
+    RefineStepReport report;
+    (void)PageSet(bundle).inOneLight({}, report);
+    EXPECT_EQ(report.views, 0);
+}
+
 TEST(Exposure, WhoReadsViewsMayEndIt) {
     const Bundle bundle = torusViews(64);
     std::vector<Camera> cameras;
