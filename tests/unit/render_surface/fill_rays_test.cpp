@@ -94,7 +94,8 @@ TEST(FillHalf, WhatItKeepsIsWhatHasAFilledPixelBeside) {
     std::mt19937 random(3);
     for (const auto& [width, height] : {std::array{67, 21}, std::array{64, 2}, std::array{1, 1}}) {
         Half half{Image<glm::vec4>((width + 1) / 2, (height + 1) / 2, glm::vec4(0.0f)),
-                  Image<float>((width + 1) / 2, (height + 1) / 2, 0.0f)};
+                  Image<float>((width + 1) / 2, (height + 1) / 2, 0.0f),
+                  Image<std::uint8_t>((width + 1) / 2, (height + 1) / 2, 0)};
         for (std::size_t i = 0; i < half.q.count(); ++i) {
             if (random() % 5 != 0) continue;
             half.q.data()[i] = 0.5f;
@@ -109,6 +110,18 @@ TEST(FillHalf, WhatItKeepsIsWhatHasAFilledPixelBeside) {
                     << x << " " << y;
         }
     }
+}
+
+TEST(FillHalf, OnlyWhatIsAmidFilledPixelsIsLikeThem) {
+    Half half{Image<glm::vec4>(3, 2, glm::vec4(1.0f)), Image<float>(3, 2, 0.5f),
+              Image<std::uint8_t>(3, 2, 0)};
+    EXPECT_FALSE(half.at(1, 1).mixed);
+    half.surface.at(1, 0) = 1;
+    EXPECT_TRUE(half.at(1, 1).mixed);
+    EXPECT_FALSE(half.at(0, 1).mixed);  // beside the border
+    half.surface.at(1, 0) = 0;
+    half.q.at(1, 0) = 0;
+    EXPECT_TRUE(half.at(1, 1).mixed);
 }
 
 }  // namespace

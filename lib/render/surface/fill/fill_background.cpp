@@ -71,11 +71,10 @@ constexpr float kLeastRange = 0.2f, kNearestWeight = 0.01f;
 
 /// The frame at half the size, rounded up: each pixel is the mean of the closed ones among its
 /// four, and open where there is none.
-void halve(const OpenFrame& frame, const Image<std::uint8_t>& distances, Image<glm::vec4>& albedo,
-           Image<float>& q) {
+Half halved(const OpenFrame& frame, const Image<std::uint8_t>& distances) {
     const int width = (frame.q.width() + 1) / 2, height = (frame.q.height() + 1) / 2;
-    albedo = Image<glm::vec4>(width, height, glm::vec4(0.0f));
-    q = Image<float>(width, height, 0.0f);
+    Half half{Image<glm::vec4>(width, height, glm::vec4(0.0f)), Image<float>(width, height, 0.0f),
+              Image<std::uint8_t>(width, height, 0)};
     parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < width; ++x) {
@@ -85,16 +84,18 @@ void halve(const OpenFrame& frame, const Image<std::uint8_t>& distances, Image<g
                     const int nx = 2 * x + k % 2, ny = 2 * y + k / 2;
                     if (!frame.q.contains(nx, ny) || distances.at(nx, ny) > 0) continue;
                     const Hit hit = hitAt(frame, nx, ny, 0);
-                    albedo.at(x, y) += glm::vec4(hit.colour, 1.0f);
-                    q.at(x, y) += hit.q;
+                    half.albedo.at(x, y) += glm::vec4(hit.colour, 1.0f);
+                    half.q.at(x, y) += hit.q;
                     count += 1;
                 }
                 if (count == 0) continue;
-                albedo.at(x, y) /= count;
-                q.at(x, y) /= count;
+                half.albedo.at(x, y) /= count;
+                half.q.at(x, y) /= count;
+                half.surface.at(x, y) = 1;
             }
         }
     });
+    return half;
 }
 
 /// The frame averaged by `factor` along each side. Pixels that are open in part have no q: what
@@ -307,7 +308,7 @@ void fillLevel(OpenFrame& frame, std::span<const LocalSource> sources, int scale
     if (farthest == 0) return;
     Half half;
     if (farthest > kSurelyMet) {
-        halve(frame, distances, half.albedo, half.q);
+        half = halved(frame, distances);
         OpenFrame smaller{half.albedo, half.q, frame.space};
         fillLevel(smaller, sources, 2 * scale, false);
     }

@@ -12,7 +12,7 @@ namespace stx::surface {
 
 /// What a frame of half the size has between its pixels.
 struct Sample {
-    bool mixed = true;       ///< some are open, others not
+    bool mixed = true;       ///< not all are filled, nor all open
     glm::vec3 colour{0.0f};  ///< of those that are not open
     float q = 0;             ///< 0 where all are open
 };
@@ -21,6 +21,7 @@ struct Sample {
 struct Half {
     Image<glm::vec4> albedo;
     Image<float> q;
+    Image<std::uint8_t> surface;  ///< 1 where some of the four pixels is, which is not filled
 
     /// The two pixels along a side beside the middle of pixel `at` of the frame, which is half as
     /// wide.
@@ -51,7 +52,9 @@ struct Half {
         const auto [x0, x1] = beside(x, q.width());
         const auto [y0, y1] = beside(y, q.height());
         const std::array<float, 4> qs = {q.at(x0, y0), q.at(x1, y0), q.at(x0, y1), q.at(x1, y1)};
-        sample.mixed = std::any_of(qs.begin(), qs.end(), [](float one) { return one == 0.0f; });
+        sample.mixed = std::ranges::find(qs, 0.0f) != qs.end() ||
+                       (surface.at(x0, y0) | surface.at(x1, y0) | surface.at(x0, y1) |
+                        surface.at(x1, y1)) != 0;
         const float tu = x % 2 ? 0.25f : 0.75f, tv = y % 2 ? 0.25f : 0.75f;
         const std::array<float, 4> weights = {(1 - tu) * (1 - tv), tu * (1 - tv), (1 - tu) * tv,
                                               tu * tv};
