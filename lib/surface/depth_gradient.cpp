@@ -25,6 +25,9 @@ constexpr double kStepRoom = 1.01;
 /// Of orthographic views: pixel spacings of depth that neighbours on one surface may always differ
 /// by.
 constexpr double kOrthographicSlope = 4.0;
+/// Neighbours differ by so many times what tells two surfaces apart where the slopes on both sides
+/// must explain it: a step looks like a slope from one side.
+constexpr double kSteep = 4.0;
 /// Windows are weighed by a Gaussian of this width: per pixel of their radius, and in pixels.
 constexpr double kSigmaOfRadius = 0.6, kSigmaLeast = 0.3;
 /// Taps nearly on a line (determinant over squared weight) give no plane.
@@ -208,12 +211,15 @@ void link(const ReferenceView& view, double discontinuity, DepthSurface& surface
                 std::max(limit, kOrthographicSlope * view.camera.sampleSpacing(1.0)[dx ? 0 : 1]);
         const double d = b - a;
         if (std::abs(d) <= limit) return true;
-        if (std::abs(d) > 4 * limit) return false;
-        const auto explains = [&](int fx, int fy, int tx, int ty) {
-            return w.contains(fx, fy) && w.contains(tx, ty) &&
-                   std::abs(d - (static_cast<double>(w.at(tx, ty)) - w.at(fx, fy))) <= limit;
+        // How far the slope of two pixels beside misses it; NaN where they are not there.
+        const auto misses = [&](int fx, int fy, int tx, int ty) {
+            if (!w.contains(fx, fy) || !w.contains(tx, ty)) return std::nan("");
+            return std::abs(d - (static_cast<double>(w.at(tx, ty)) - w.at(fx, fy)));
         };
-        return explains(x - dx, y - dy, x, y) || explains(qx, qy, qx + dx, qy + dy);
+        const double before = misses(x - dx, y - dy, x, y);
+        const double after = misses(qx, qy, qx + dx, qy + dy);
+        if (std::abs(d) <= kSteep * limit) return before <= limit || after <= limit;
+        return !(before > limit) && !(after > limit) && (before <= limit || after <= limit);
     };
     parallelFor(0, height, kRowsPerTask, [&](int y) {
         for (int x = 0; x < width; ++x) {
