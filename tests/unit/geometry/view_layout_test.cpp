@@ -78,5 +78,20 @@ TEST(OrbitCameras, FollowTheRadius) {
     EXPECT_LT(glm::distance((*tiny)[0].position * 1e12, (*unit)[0].position), 1e-6);
 }
 
+TEST(OrbitCameras, TurnFromStraightAboveAsFromJustBeside) {
+    for (const double side : {1.0, -1.0}) {
+        CameraSettings lens;
+        lens.up = glm::dvec3(1, 2, 0.5);
+        OrbitSettings above, beside;
+        above.count = beside.count = 4;
+        above.elevationRad = side * std::numbers::pi / 2;
+        beside.elevationRad = side * (std::numbers::pi / 2 - 1e-4);
+        const auto a = orbitCameras({}, 1, above, lens), b = orbitCameras({}, 1, beside, lens);
+        ASSERT_TRUE(a && b);
+        for (std::size_t i = 0; i < 4; ++i)
+            EXPECT_GT(std::abs(glm::dot((*a)[i].orientation, (*b)[i].orientation)), 1 - 1e-6) << i;
+    }
+}
+
 }  // namespace
 }  // namespace stx
