@@ -141,7 +141,7 @@ Converted summaryOf(const Bundle& bundle, bool countPoints) {
 /// What is there of a bundle, with the changes that were asked for, if any.
 Result<std::unique_ptr<ViewTable>> changedAsAsked(std::unique_ptr<ViewTable> table, bool imported,
                                                   const std::filesystem::path& target,
-                                                  const ConvertOptions& o, LargestStep& step,
+                                                  const ConvertOptions& o, CodedDepth& codes,
                                                   Program& program) {
     const auto bits = o.mesh->depthBits;
     if (o.refining.steps != "auto")
@@ -152,7 +152,7 @@ Result<std::unique_ptr<ViewTable>> changedAsAsked(std::unique_ptr<ViewTable> tab
     if (!bits || std::ranges::all_of(std::as_const(*table).about().views,
                                      [&](const auto& v) { return v.depthBits == *bits; }))
         return table;
-    return changedViews(std::move(table), withDepthBits(*bits, step));
+    return changedViews(std::move(table), withDepthBits(*bits, codes));
 }
 
 /// One moment, of which each view is written when it is there.
@@ -167,7 +167,7 @@ Result<Converted> convertStill(const std::filesystem::path& input,
     if (o.environment.given()) STX_SET(environment, environmentOf(o.environment, program.job));
     Converted done;
     ViewTally tally;
-    LargestStep step;
+    CodedDepth codes;
     const auto save = [&](std::unique_ptr<ViewTable> table, Job& job) -> Result<void> {
         if (o.environment.given()) table->about().environment = environment;
         if (mesh) table->about().title = input.stem().string();
@@ -189,9 +189,9 @@ Result<Converted> convertStill(const std::filesystem::path& input,
                          withMeshViews(*mesh, *o.mesh, program, save)));
     } else {
         STX_TRY(auto table, changedAsAsked(std::move(std::get<1>(opened)), *imported, target, o,
-                                           step, program));
+                                           codes, program));
         STX_CHECK(save(std::move(table), program.job));
-        noteDepthLoss(step.largest(), program.job);
+        codes.note(program.job);
     }
     done.points += tally.points();
     return done;

@@ -1,8 +1,6 @@
 #include "tools/mesh_views.hpp"
 
-#include <algorithm>
 #include <filesystem>
-#include <mutex>
 #include <set>
 
 #include "formats/imagesets/camera_file.hpp"
@@ -179,7 +177,9 @@ Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& 
     if (selection && chosen.views.selection) *selection = std::move(*chosen.views.selection);
     if (chosen.views.cameras.size() > 1) keepFreedMemory();
     STX_TRY(auto bundle, captureViews(mesh, chosen.views.cameras, chosen.settings, program.job));
-    noteDepthLoss(bundle, program.job);
+    CodedDepth codes;
+    for (const ReferenceView& view : bundle.views) codes.add(view);
+    codes.note(program.job);
     return bundle;
 }
 
@@ -187,20 +187,16 @@ Result<void> withMeshViews(
     const Mesh& mesh, const MeshViewOptions& o, Program& program,
     const std::function<Result<void>(std::unique_ptr<ViewTable> table, Job& job)>& use) {
     STX_TRY(const auto chosen, chooseMeshViews(mesh, o, program));
-    std::mutex mutex;
-    double largestStep = 0;
+    CodedDepth codes;
     STX_CHECK(withViewsOf(mesh, chosen.views.cameras, chosen.settings, program.job,
                           [&](std::unique_ptr<ViewTable> table, Job& job) {
                               return use(watchedViews(std::move(table),
                                                       [&](std::size_t, const ReferenceView& view) {
-                                                          if (view.depthBits != 8) return;
-                                                          const std::lock_guard lock(mutex);
-                                                          largestStep = std::max(
-                                                              largestStep, view.depthCode().step());
+                                                          codes.add(view);
                                                       }),
                                          job);
                           }));
-    noteDepthLoss(largestStep, program.job);
+    codes.note(program.job);
     return {};
 }
 

@@ -1,17 +1,16 @@
 #include "tools/view_changes.hpp"
 
-#include "formats/stx/mesh_views.hpp"
 #include "lib/render/around/around.hpp"
 #include "lib/render/factory.hpp"
 #include "tools/drawn_views.hpp"
 
 namespace stx::tools {
 
-ViewChange withDepthBits(int bits, LargestStep& step) {
+ViewChange withDepthBits(int bits, CodedDepth& codes) {
     ViewChange change;
-    change.change = [bits, &step](ReferenceView& view, Job&) -> Result<void> {
+    change.change = [bits, &codes](ReferenceView& view, Job&) -> Result<void> {
         setDepthBits(view, bits);
-        if (bits == 8) step.add(view.depthCode().step());
+        codes.add(view);
         return {};
     };
     change.header = [bits](ViewHeader& header) { header.depthBits = bits; };

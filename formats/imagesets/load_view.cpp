@@ -173,20 +173,6 @@ Result<StoredView> readImages(const SetView& set, const ImageSetOptions& options
     return stored;
 }
 
-/// Codes of 16 bits are fine enough where a step of them is at most this share of a pixel's
-/// size at the nearest point. Two spheres before a far value: a share of 0.1 gives 42.9 dB (floats
-/// 42.7), of 1 31.2 dB, of 60 25.9 dB.
-constexpr double kFineStep = 0.25;
-
-/// Bits of depth for a view whose planes were fitted to its points: those that are asked for, else
-/// 16 where these are fine enough, else 32.
-int bitsFor(const ReferenceView& view, const ImageSetOptions& options) {
-    if (options.depthBits != 0) return options.depthBits;
-    const glm::dvec2 pixel = view.camera.sampleSpacing(view.nearPlane);
-    const double step = DepthCode{view.nearPlane, view.farPlane, 65535}.step();
-    return step <= kFineStep * std::min(pixel.x, pixel.y) ? 16 : 32;
-}
-
 /// Sets nearPlane, farPlane and depthBits.
 void setPlanes(ReferenceView& view, const SetView& set, const ImageSetOptions& options, Job& job) {
     if (set.planes && set.depthBits != 0 &&
@@ -207,7 +193,9 @@ void setPlanes(ReferenceView& view, const SetView& set, const ImageSetOptions& o
     }
     view.depthBits = 32;  // nothing is rounded before the planes tell how coarse codes would be
     fitDepthRange(view);
-    view.depthBits = bitsFor(view, options);
+    view.depthBits = options.depthBits == 0 ? 16 : options.depthBits;
+    if (options.depthBits == 0 && view.depthStepInPixels() > ViewHeader::kFineStep)
+        view.depthBits = 32;
     if (view.depthBits < 32 && options.roundFrames)
         roundToCode(view.depth.pixels(), view.depthCode());
     if (view.depthBits == 8 && options.roundFrames)

@@ -142,19 +142,27 @@ bool setDepthBits(ReferenceView& view, int bits) {
     return true;
 }
 
-void noteDepthLoss(const Bundle& bundle, Job& job) {
-    double largest = 0;
-    for (const auto& view : bundle.views)
-        if (view.depthBits == 8) largest = std::max(largest, view.depthCode().step());
-    noteDepthLoss(largest, job);
+void CodedDepth::add(const ViewHeader& view) {
+    const std::lock_guard lock(mutex_);
+    const double step = view.depthCode().step(), pixels = view.depthStepInPixels();
+    if (view.depthBits == 8) {
+        step8_ = std::max(step8_, step);
+    } else if (pixels > ViewHeader::kFineStep) {
+        step16_ = std::max(step16_, step);
+        pixels_ = std::max(pixels_, pixels);
+    }
 }
 
-void noteDepthLoss(double largestStep, Job& job) {
-    const double worst = largestStep * 0.5;
-    if (worst > 0)
+void CodedDepth::note(Job& job) const {
+    if (step8_ > 0)
         job.note(fmt::format(
             "depth in 8 bits is off by up to {:.3g} scene units; 16 bits are 257 times finer",
-            worst));
+            step8_ / 2));
+    if (step16_ > 0)
+        job.note(
+            fmt::format("depth in 16 bits is off by up to {:.3g} scene units, {:.2g} times "
+                        "the size of the nearest pixels; 32 bits keep it, in OpenEXR",
+                        step16_ / 2, pixels_ / 2));
 }
 
 }  // namespace stx

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -51,9 +52,17 @@ bool setDepthBits(Bundle& bundle, int bits);
 /// The same of one view.
 bool setDepthBits(ReferenceView& view, int bits);
 
-/// Notes what 8-bit depth costs, in scene units, when a view has it.
-void noteDepthLoss(const Bundle& bundle, Job& job);
-/// The same of the largest step of depth codes of 8 bits; 0: no view has such.
-void noteDepthLoss(double largestStep, Job& job);
+/// What the depth codes of views cost, for a note: of 8 bits always, of 16 where that shows
+/// (ViewHeader::kFineStep). Safe for threads.
+class CodedDepth {
+  public:
+    void add(const ViewHeader& view);
+    void note(Job& job) const;
+
+  private:
+    std::mutex mutex_;
+    double step8_ = 0, step16_ = 0;  ///< the largest, scene units
+    double pixels_ = 0;              ///< the largest of 16 bits, see depthStepInPixels()
+};
 
 }  // namespace stx

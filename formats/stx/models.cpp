@@ -119,7 +119,9 @@ Result<Bundle> convert(Model model, const ConvertSettings& settings, Job& job) {
     if (!settings.title.empty()) bundle->title = settings.title;
     if (settings.depthBits) {
         setDepthBits(*bundle, *settings.depthBits);
-        noteDepthLoss(*bundle, job);
+        CodedDepth codes;
+        for (const ReferenceView& view : bundle->views) codes.add(view);
+        codes.note(job);
     }
     return bundle;
 }
