@@ -181,6 +181,8 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         STX_TRY(const auto picture, source.film->picture(source.frame));
         if (picture.bits() > 8)
             job.note(fmt::format("colour of {} bits is rounded to 8", picture.bits()));
+        if (const std::string note = picture.notConverted(); !note.empty())
+            job.note(inQuotes(source.name) + ": " + note);
         STX_TRY(auto image, within(inQuotes(source.name), picture.colour(job.limits)));
         out.texture = std::move(image);
         return out;

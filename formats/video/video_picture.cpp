@@ -1,5 +1,11 @@
 #include "formats/video/video_picture.hpp"
 
+#include <fmt/ranges.h>
+
+#include <cstring>
+#include <string_view>
+#include <vector>
+
 namespace stx {
 namespace {
 
@@ -33,7 +39,81 @@ Image<T> turned(Image<T> picture, video::Turn turn) {
     return out;
 }
 
+/// Of ITU-T H.273, what colours are not converted from; "" for the others, whose difference to
+/// sRGB is small (BT.601) or which say nothing.
+std::string_view primariesName(int code) {  // table 2
+    switch (code) {
+        case 4:
+            return "BT.470 M";
+        case 8:
+            return "film";
+        case 9:
+            return "BT.2020";
+        case 10:
+            return "XYZ";
+        case 11:
+            return "DCI-P3";
+        case 12:
+            return "Display P3";
+        case 22:
+            return "EBU 3213";
+        default:
+            return {};
+    }
+}
+std::string_view transferName(int code) {  // table 3
+    switch (code) {
+        case 8:
+            return "linear";
+        case 9:
+        case 10:
+            return "logarithmic";
+        case 16:
+            return "PQ";
+        case 17:
+            return "ST 428";
+        case 18:
+            return "HLG";
+        default:
+            return {};
+    }
+}
+std::string_view matrixName(int code) {  // table 4
+    switch (code) {
+        case 8:
+            return "YCgCo";
+        case 10:
+            return "BT.2020 with constant luminance";
+        case 11:
+            return "ST 2085";
+        case 12:
+        case 13:
+            return "of its primaries";
+        case 14:
+            return "ICtCp";
+        default:
+            return {};
+    }
+}
+
 }  // namespace
+
+std::string VideoPicture::notConverted() const {
+    std::vector<std::string> what;
+    const auto add = [&](std::string_view name, std::string_view of, std::string_view takenFor) {
+        if (!name.empty()) what.push_back(fmt::format("{} {} for {}", of, name, takenFor));
+    };
+    add(primariesName(header_.primariesSaid), "primaries", "BT.709");
+    add(transferName(header_.transferSaid), "transfer function", "sRGB");
+    if (header_.chroma || header_.rgba)
+        add(matrixName(header_.matrixSaid), "matrix",
+            header_.matrix == YuvMatrix::bt2020 ? "BT.2020" : "BT.709");
+    if (what.empty()) return {};
+    return fmt::format(
+        "colours of the video are taken as they are, {}; to convert them first: ffmpeg -i IN -vf "
+        "zscale=p=709:t=709:m=709 -c:v ffv1 OUT.mkv",
+        fmt::join(what, ", "));
+}
 
 Result<VideoPicture> VideoPicture::from(Bytes answer, const Limits& limits) {
     VideoPicture out;
@@ -43,8 +123,9 @@ Result<VideoPicture> VideoPicture::from(Bytes answer, const Limits& limits) {
     const auto wrong = [] {
         return fail(ErrorCode::failed, "the video decoder gave a picture that makes no sense");
     };
-    if (!in.ok() || h.bits < 8 || h.bits > 16 || h.chromaShiftX < 0 || h.chromaShiftX > 1 ||
-        h.chromaShiftY < 0 || h.chromaShiftY > h.chromaShiftX)
+    if (!in.ok() || h.matrix > YuvMatrix::bt2020 || h.bits < 8 || h.bits > 16 ||
+        h.chromaShiftX < 0 || h.chromaShiftX > 1 || h.chromaShiftY < 0 ||
+        h.chromaShiftY > h.chromaShiftX)
         return wrong();
     if (h.width < 1 || h.height < 1 || h.width > limits.maxImageSide ||
         h.height > limits.maxImageSide)
@@ -65,9 +146,8 @@ Result<Rgba8Image> VideoPicture::colour(const Limits& limits) const {
         std::memcpy(out.data(), samples.data(), samples.size());
         return turned(std::move(out), turn_);
     }
-    STX_TRY(auto out,
-            rgbFromYuv(samples, formatOf(header_), {header_.bt601 != 0, header_.fullRange != 0},
-                       "the picture", limits));
+    STX_TRY(auto out, rgbFromYuv(samples, formatOf(header_),
+                                 {header_.matrix, header_.fullRange != 0}, "the picture", limits));
     return turned(std::move(out), turn_);
 }
 

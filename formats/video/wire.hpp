@@ -1,6 +1,7 @@
 #pragma once
 
 #include "formats/decoders/wire.hpp"
+#include "formats/yuv/yuv_colour.hpp"
 
 /// What is said between this process and the one that decodes video, beside the messages
 /// themselves: a request and its answer, one after the other.
@@ -16,9 +17,13 @@ struct PictureHeader {
     std::int32_t width = 0, height = 0;
     std::int32_t bits = 8;  ///< of a sample; above 8 in two bytes, little-endian
     std::int32_t chromaShiftX = 0, chromaShiftY = 0;
-    std::uint8_t chroma = 0, chromaLeft = 0, bt601 = 0, fullRange = 0, rgba = 0;
+    std::uint8_t chroma = 0, chromaLeft = 0;
+    YuvMatrix matrix = YuvMatrix::bt709;  ///< by which it is decoded
+    std::uint8_t fullRange = 0, rgba = 0;
     std::uint8_t limitedSaid = 0;  ///< the stream itself says that its range is limited
-    std::uint8_t unused[2] = {};
+    /// What the stream says of its colours, by the numbers of ITU-T H.273; 2: nothing.
+    std::uint8_t primariesSaid = 2, transferSaid = 2, matrixSaid = 2;
+    std::uint8_t unused[3] = {};
 };
 
 struct EncoderRequest {

@@ -47,12 +47,37 @@ int saidValue(const Enumeration& said) {
     return value;
 }
 
+/// The same of a code of H.273, which libav's numbers are; 2, nothing, of what is none.
+template <class Enumeration>
+std::uint8_t codeSaid(const Enumeration& said) {
+    const int value = saidValue(said);
+    return static_cast<std::uint8_t>(value >= 0 && value < 256 ? value : 2);
+}
+
+YuvMatrix matrixOf(int space, int height) {
+    switch (space) {
+        case AVCOL_SPC_BT470BG:
+        case AVCOL_SPC_SMPTE170M:
+        case AVCOL_SPC_FCC:
+            return YuvMatrix::bt601;
+        case AVCOL_SPC_SMPTE240M:
+            return YuvMatrix::smpte240;
+        case AVCOL_SPC_BT2020_NCL:
+        case AVCOL_SPC_BT2020_CL:
+            return YuvMatrix::bt2020;
+        case AVCOL_SPC_UNSPECIFIED:  // as players take it
+            return height < 720 ? YuvMatrix::bt601 : YuvMatrix::bt709;
+        default:
+            return YuvMatrix::bt709;
+    }
+}
+
 struct FreeScaler {
     void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
 };
 
 /// Other forms of pixels, through libswscale.
-std::vector<std::byte> rgbaOf(const AVFrame& frame, bool bt601, bool fullRange) {
+std::vector<std::byte> rgbaOf(const AVFrame& frame, YuvMatrix of, bool fullRange) {
     const auto width = frame.width, height = frame.height;
     const std::unique_ptr<SwsContext, FreeScaler> scaler(sws_getContext(
         width, height, static_cast<AVPixelFormat>(frame.format), width, height, AV_PIX_FMT_RGBA,
@@ -61,7 +86,10 @@ std::vector<std::byte> rgbaOf(const AVFrame& frame, bool bt601, bool fullRange) 
     if (!scaler)
         refuse(ErrorCode::unsupported, "pixels of the kind {} are not read",
                av_get_pix_fmt_name(static_cast<AVPixelFormat>(frame.format)));
-    const int* matrix = sws_getCoefficients(bt601 ? SWS_CS_ITU601 : SWS_CS_ITU709);
+    const int* matrix = sws_getCoefficients(of == YuvMatrix::bt601      ? SWS_CS_ITU601
+                                            : of == YuvMatrix::smpte240 ? SWS_CS_SMPTE240M
+                                            : of == YuvMatrix::bt2020   ? SWS_CS_BT2020
+                                                                        : SWS_CS_ITU709);
     sws_setColorspaceDetails(scaler.get(), matrix, fullRange ? 1 : 0, matrix, 1, 0, 1 << 16,
                              1 << 16);
     std::vector<std::byte> out(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
@@ -92,10 +120,10 @@ std::vector<std::byte> packed(const AVFrame& frame, const AVCodecContext& codec)
     // Where it is not said, luma alone is of full range, and luma with chroma is not.
     header.fullRange =
         range == AVCOL_RANGE_JPEG || jpegPixels || (grey && range == AVCOL_RANGE_UNSPECIFIED);
-    header.bt601 = space == AVCOL_SPC_BT470BG || space == AVCOL_SPC_SMPTE170M ||
-                   space == AVCOL_SPC_FCC ||
-                   // As players take it.
-                   (space == AVCOL_SPC_UNSPECIFIED && frame.height < 720);
+    header.matrix = matrixOf(space, frame.height);
+    header.primariesSaid = codeSaid(frame.color_primaries);
+    header.transferSaid = codeSaid(frame.color_trc);
+    header.matrixSaid = codeSaid(frame.colorspace);
     int chroma = saidValue(frame.chroma_location);
     if (chroma == AVCHROMA_LOC_UNSPECIFIED) chroma = saidValue(codec.chroma_sample_location);
     header.chromaLeft = chroma == AVCHROMA_LOC_UNSPECIFIED
@@ -105,7 +133,7 @@ std::vector<std::byte> packed(const AVFrame& frame, const AVCodecContext& codec)
     Packer out;
     if (!isPlanes(*format)) {
         header.rgba = 1;
-        const auto rgba = rgbaOf(frame, header.bt601 != 0, header.fullRange != 0);
+        const auto rgba = rgbaOf(frame, header.matrix, header.fullRange != 0);
         out.put(header);
         out.add(rgba.data(), rgba.size());
         return std::move(out.bytes);
