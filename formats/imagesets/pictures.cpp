@@ -208,6 +208,7 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         out.texture = rgba8From(image);
         return out;
     }
+    if (const std::string note = toRec709(image); !note.empty()) job.note(note);
     STX_TRY(auto pixels, colourOfFloats(image, source.name));
     out.texture = std::move(pixels);
     return out;

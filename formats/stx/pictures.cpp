@@ -108,7 +108,9 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
         STX_TRY(picture.coded, decodeUpright(bytes, path.string(), job.limits));
         return picture;
     }
-    STX_TRY(const auto decoded, decodeImage(bytes, path.string(), job.limits));
+    STX_TRY(auto decoded, decodeImage(bytes, path.string(), job.limits));
+    if (const std::string note = toRec709(decoded); !note.empty())
+        job.note(fmt::format("{}: {}", inQuotes(path.string()), note));
     const auto pixels = static_cast<std::uint64_t>(decoded.width) * decoded.height;
     const std::uint64_t bytesEach =
         static_cast<std::uint64_t>(decoded.channels) * decoded.bits() / 8;
