@@ -184,6 +184,7 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         if (const std::string note = picture.notConverted(); !note.empty())
             job.note(inQuotes(source.name) + ": " + note);
         STX_TRY(auto image, within(inQuotes(source.name), picture.colour(job.limits)));
+        out.alpha = picture.hasAlpha();
         out.texture = std::move(image);
         return out;
     }

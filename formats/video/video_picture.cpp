@@ -2,6 +2,7 @@
 
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cstring>
 #include <string_view>
 #include <vector>
@@ -21,8 +22,20 @@ YuvFormat formatOf(const video::PictureHeader& h) {
     return format;
 }
 
+/// Of the plane behind the others.
+std::uint64_t alphaBytes(const video::PictureHeader& h) {
+    return h.alpha && !h.rgba ? std::uint64_t{1} * h.width * h.height * (h.bits > 8 ? 2 : 1) : 0;
+}
+
 ByteSpan samplesOf(const Bytes& bytes) {
     return ByteSpan(bytes).subspan(sizeof(video::PictureHeader));
+}
+
+std::uint32_t sampleAt(ByteSpan plane, std::size_t i, int bits) {
+    if (bits == 8) return std::to_integer<std::uint32_t>(plane[i]);
+    std::uint16_t sample = 0;
+    std::memcpy(&sample, plane.data() + 2 * i, 2);
+    return sample;
 }
 
 template <class T>
@@ -134,7 +147,8 @@ Result<VideoPicture> VideoPicture::from(Bytes answer, const Limits& limits) {
                     limits.maxImageSide);
     const std::uint64_t pixels =
         static_cast<std::uint64_t>(h.width) * static_cast<std::uint64_t>(h.height);
-    if (in.rest().size() != (h.rgba ? pixels * 4 : formatOf(h).frameBytes())) return wrong();
+    if (in.rest().size() != (h.rgba ? pixels * 4 : formatOf(h).frameBytes() + alphaBytes(h)))
+        return wrong();
     out.bytes_ = std::move(answer);
     return out;
 }
@@ -146,21 +160,25 @@ Result<Rgba8Image> VideoPicture::colour(const Limits& limits) const {
         std::memcpy(out.data(), samples.data(), samples.size());
         return turned(std::move(out), turn_);
     }
-    STX_TRY(auto out, rgbFromYuv(samples, formatOf(header_),
+    const YuvFormat format = formatOf(header_);
+    STX_TRY(auto out, rgbFromYuv(samples.first(format.frameBytes()), format,
                                  {header_.matrix, header_.fullRange != 0}, "the picture", limits));
+    if (header_.alpha) {
+        const ByteSpan plane = samples.subspan(format.frameBytes());
+        const std::uint32_t largest = (1u << header_.bits) - 1;
+        for (std::size_t i = 0; i < out.count(); ++i) {
+            const std::uint32_t code = std::min(sampleAt(plane, i, header_.bits), largest);
+            out.data()[i].a = static_cast<std::uint8_t>((code * 255 + largest / 2) / largest);
+        }
+    }
     return turned(std::move(out), turn_);
 }
 
 Image<std::uint16_t> VideoPicture::lumaImage() const {
     const ByteSpan samples = samplesOf(bytes_);
     Image<std::uint16_t> out(header_.width, header_.height);
-    for (std::size_t i = 0; i < out.count(); ++i) {
-        if (header_.bits == 8) {
-            out.data()[i] = std::to_integer<std::uint16_t>(samples[i]);
-        } else {
-            std::memcpy(&out.data()[i], samples.data() + 2 * i, 2);
-        }
-    }
+    for (std::size_t i = 0; i < out.count(); ++i)
+        out.data()[i] = static_cast<std::uint16_t>(sampleAt(samples, i, header_.bits));
     return turned(std::move(out), turn_);
 }
 

@@ -23,6 +23,8 @@ class VideoPicture {
     [[nodiscard]] int bits() const { return header_.bits; }
     /// Luma is there as it was coded; else the picture has colours only.
     [[nodiscard]] bool hasLuma() const { return header_.rgba == 0; }
+    /// Its pixels have alpha, which colour() gives straight; else that is 255.
+    [[nodiscard]] bool hasAlpha() const { return header_.alpha != 0; }
     /// What the stream says of its colours and colour() does not do, for a note; else empty.
     [[nodiscard]] std::string notConverted() const;
     /// Its stream says that 16 (of 8 bits) is black; what holds depth should not.

@@ -11,8 +11,8 @@ using decoders::Packer;
 using decoders::Tag;
 using decoders::Unpacker;
 
-/// How the samples of a picture lie behind this header: planes Y, Cb, Cr from the top, without
-/// gaps, or 8-bit RGBA.
+/// How the samples of a picture lie behind this header: planes Y, Cb, Cr and alpha from the top,
+/// without gaps, or 8-bit RGBA.
 struct PictureHeader {
     std::int32_t width = 0, height = 0;
     std::int32_t bits = 8;  ///< of a sample; above 8 in two bytes, little-endian
@@ -23,7 +23,8 @@ struct PictureHeader {
     std::uint8_t limitedSaid = 0;  ///< the stream itself says that its range is limited
     /// What the stream says of its colours, by the numbers of ITU-T H.273; 2: nothing.
     std::uint8_t primariesSaid = 2, transferSaid = 2, matrixSaid = 2;
-    std::uint8_t unused[3] = {};
+    std::uint8_t alpha = 0;  ///< the stream has it: a last plane as large as Y, of full range, or A
+    std::uint8_t unused[2] = {};
 };
 
 struct EncoderRequest {

@@ -7,15 +7,19 @@
 namespace stx::video {
 namespace {
 
-/// Luma alone, or luma and chroma, each in a plane of its own, 8 to 16 bits.
+bool hasAlpha(const AVPixFmtDescriptor& format) {
+    return (format.flags & AV_PIX_FMT_FLAG_ALPHA) != 0;
+}
+
+/// Luma alone, or luma and chroma, and alpha, each in a plane of its own, 8 to 16 bits.
 bool isPlanes(const AVPixFmtDescriptor& format) {
     if (format.flags & (AV_PIX_FMT_FLAG_RGB | AV_PIX_FMT_FLAG_PAL | AV_PIX_FMT_FLAG_BITSTREAM |
                         AV_PIX_FMT_FLAG_HWACCEL | AV_PIX_FMT_FLAG_FLOAT | AV_PIX_FMT_FLAG_BAYER))
         return false;
-    const int count = format.nb_components - ((format.flags & AV_PIX_FMT_FLAG_ALPHA) ? 1 : 0);
+    const int count = format.nb_components - (hasAlpha(format) ? 1 : 0);
     if (count != 1 && count != 3) return false;
     if (format.log2_chroma_w > 1 || format.log2_chroma_h > format.log2_chroma_w) return false;
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < format.nb_components; ++i) {
         const AVComponentDescriptor& c = format.comp[i];
         const int bytes = c.depth > 8 ? 2 : 1;
         if (c.plane != i || c.step != bytes || c.offset != 0 || c.shift != 0 || c.depth < 8 ||
@@ -111,8 +115,8 @@ std::vector<std::byte> packed(const AVFrame& frame, const AVCodecContext& codec)
     PictureHeader header;
     header.width = frame.width;
     header.height = frame.height;
-    const bool grey =
-        format->nb_components - ((format->flags & AV_PIX_FMT_FLAG_ALPHA) ? 1 : 0) == 1;
+    header.alpha = hasAlpha(*format);
+    const bool grey = format->nb_components - (hasAlpha(*format) ? 1 : 0) == 1;
     const bool jpegPixels = pixels == AV_PIX_FMT_YUVJ420P || pixels == AV_PIX_FMT_YUVJ422P ||
                             pixels == AV_PIX_FMT_YUVJ444P || pixels == AV_PIX_FMT_YUVJ440P;
     const int range = saidValue(frame.color_range), space = saidValue(frame.colorspace);
@@ -152,6 +156,9 @@ std::vector<std::byte> packed(const AVFrame& frame, const AVCodecContext& codec)
         for (const int plane : {1, 2})
             addPlane(out.bytes, frame, plane, width, height, bytes, bigEndian);
     }
+    if (hasAlpha(*format))
+        addPlane(out.bytes, frame, format->nb_components - 1, frame.width, frame.height, bytes,
+                 bigEndian);
     return std::move(out.bytes);
 }
 

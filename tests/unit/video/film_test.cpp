@@ -256,6 +256,60 @@ TEST(Films, ColoursThatAreNotConvertedAreNotedOnce) {
                                              kAdvice)});
 }
 
+/// File and arguments of a coding with alpha.
+class FilmsWithAlpha : public testing::TestWithParam<std::pair<const char*, const char*>> {};
+
+TEST_P(FilmsWithAlpha, KeepIt) {
+    REQUIRE_VIDEO();
+    const auto& [file, arguments] = GetParam();
+    const TemporaryFolder folder;
+    Rgba8Image picture(kWide, kHigh, {200, 100, 40, 255});
+    for (int y = 0; y < kHigh; ++y)
+        for (int x = 0; x < kWide / 2; ++x) picture.at(x, y).a = x < kWide / 4 ? 0 : 128;
+    const auto png = encodePng(kWide, kHigh, 4, 8, picture.data(), true);
+    ASSERT_TRUE(writeFile(folder / "c0.png", *png));
+    films::ffmpeg(folder.path(), fmt::format("-i c%d.png {} {}", arguments, file));
+    const auto film = openedFilm(folder / file);
+    ASSERT_TRUE(film);
+    const auto decoded = film->picture(0);
+    ASSERT_TRUE(decoded) << decoded.error().text();
+    EXPECT_TRUE(decoded->hasAlpha());
+    const auto colour = decoded->colour({});
+    ASSERT_TRUE(colour);
+    for (const int x : {5, 18, 40}) {
+        const glm::ivec4 is(colour->at(x, 10)), was(picture.at(x, 10));
+        EXPECT_NEAR(is.a, was.a, 1) << "column " << x;
+        for (int k = 0; k < 3; ++k) EXPECT_NEAR(is[k], was[k], 6) << "column " << x;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, FilmsWithAlpha,
+    testing::Values(std::pair{"bgra.mkv", "-c:v ffv1 -pix_fmt bgra"},
+                    std::pair{"png.mov", "-c:v png -pix_fmt rgba"},
+                    std::pair{"yuva.mkv", "-c:v ffv1 -pix_fmt yuva420p"},
+                    std::pair{"prores.mov",
+                              "-c:v prores_ks -profile:v 4444 -pix_fmt yuva444p10le"}),
+    [](const auto& coding) {
+        const std::string file = coding.param.first;
+        return file.substr(0, file.find('.'));
+    });
+
+TEST(Films, WithoutAlphaHaveNone) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    films::writePictures(folder.path(), 1, kWide, kHigh);
+    for (const char* pixels : {"yuv420p", "bgr0"}) {
+        films::ffmpeg(folder.path(), fmt::format("-i c%d.png -c:v ffv1 -pix_fmt {} f.mkv", pixels));
+        const auto film = openedFilm(folder / "f.mkv");
+        ASSERT_TRUE(film);
+        const auto decoded = film->picture(0);
+        ASSERT_TRUE(decoded) << decoded.error().text();
+        EXPECT_FALSE(decoded->hasAlpha()) << pixels;
+        EXPECT_EQ(decoded->colour({})->at(3, 3).a, 255);
+    }
+}
+
 // Cut within a group of pictures: an edit list hides those before, which others need.
 TEST(Films, HiddenPicturesAreDecodedAndNotShown) {
     REQUIRE_VIDEO();
