@@ -1,5 +1,6 @@
 #include "formats/exr/exr_primaries.hpp"
 
+#include <cmath>
 #include <limits>
 
 namespace stx {
@@ -35,7 +36,11 @@ std::optional<glm::dmat3> rec709From(const Primaries& primaries) {
                            1.0296);
     const glm::dvec3 gain = (cones * whiteOf(rec709)) / (cones * whiteOf(primaries));
     const glm::dmat3 scale(gain.x, 0, 0, 0, gain.y, 0, 0, 0, gain.z);
-    return glm::inverse(*to) * glm::inverse(cones) * scale * cones * *from;
+    const glm::dmat3 out = glm::inverse(*to) * glm::inverse(cones) * scale * cones * *from;
+    // A white that no eye answers to.
+    for (int k = 0; k < 3; ++k)
+        if (!std::isfinite(glm::dot(out[k], glm::dvec3(1)))) return {};
+    return out;
 }
 
 }  // namespace stx

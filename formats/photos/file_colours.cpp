@@ -4,6 +4,7 @@
 #include <libdeflate.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -38,6 +39,7 @@ Bytes profileOf(const Points& points, const Curve& curve) {
     // IEC 61966-2-1: ((a x + b))^g from d on, c x below.
     constexpr double kSrgb[] = {2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045};
     constexpr int kSrgbKind = 4;
+    if (!(curve.exponent > 0 && std::isfinite(curve.exponent))) return {};
     const std::unique_ptr<cmsToneCurve, FreeCurve> tone(
         curve.srgb ? cmsBuildParametricToneCurve(nullptr, kSrgbKind, kSrgb)
                    : cmsBuildGamma(nullptr, curve.exponent));
@@ -52,6 +54,13 @@ Bytes profileOf(const Points& points, const Curve& curve) {
         if (!cmsSaveProfileToMem(made, out.data(), &size)) out.clear();
     }
     cmsCloseProfile(made);
+    return out;
+}
+
+FileColours madeOf(const Points& points, const Curve& curve) {
+    FileColours out{profileOf(points, curve), {}};
+    if (out.profile.empty())
+        out.note = "what it says of its colours (gAMA, cHRM) is of none: they are taken for sRGB";
     return out;
 }
 
@@ -130,7 +139,7 @@ FileColours coloursOfPng(ByteSpan file) {
         const unsigned primaries = byteAt(cicp, 0), transfer = byteAt(cicp, 1);
         const auto points = pointsOf(primaries);
         const auto curve = curveOf(transfer);
-        if (points && curve) return {profileOf(*points, *curve), {}};
+        if (points && curve) return madeOf(*points, *curve);
         return {{},
                 fmt::format("its colours are coded by the primaries {} and the transfer function "
                             "{} of ITU-T H.273, which are not converted: they are taken for sRGB",
@@ -148,7 +157,6 @@ FileColours coloursOfPng(ByteSpan file) {
     Curve curve;
     if (!gama.empty()) {
         const std::uint32_t gamma = bigEndian(gama, 0, 4);
-        if (gamma == 0) return {};
         curve = {gamma == kSrgbGamma, kUnit / gamma};
     }
     Points points = kRec709;
@@ -159,7 +167,7 @@ FileColours coloursOfPng(ByteSpan file) {
         };
         points = {point(0), {point(1), point(2), point(3)}};
     }
-    return {profileOf(points, curve), {}};
+    return madeOf(points, curve);
 }
 
 /// RIFF's chunk `ICCP` (WebP container specification).

@@ -95,6 +95,10 @@ TEST(FileColours, OfPngBecomeSrgb) {
         {"PQ", cicp(9, 16), given,
          "its colours are coded by the primaries 9 and the transfer function 16 of ITU-T H.273, "
          "which are not converted: they are taken for sRGB"},
+        {"no gamma", gamma(0), given,
+         "what it says of its colours (gAMA, cHRM) is of none: they are taken for sRGB"},
+        {"no primaries", chunk("cHRM", std::string(32, '\0')), given,
+         "what it says of its colours (gAMA, cHRM) is of none: they are taken for sRGB"},
         {"a profile that is none", chunk("iCCP", std::string("x\0\0", 3) + png::zlibStored("no")),
          given, "its colour profile is not one of three primaries: its colours are taken for sRGB"},
     };
