@@ -528,7 +528,8 @@ void addSetFiles(Command& c, const std::shared_ptr<ConvertOptions>& o) {
     c.option(
          "--yuv",
          [o](const std::string& text) -> Result<void> {
-             o->open.set.yuv = {text.starts_with("bt601"), text.ends_with("full")};
+             o->open.set.yuv = {text.starts_with("bt601") ? YuvMatrix::bt601 : YuvMatrix::bt709,
+                                text.ends_with("full")};
              return {};
          },
          "Colour of YUV files (default bt709)")

@@ -9,6 +9,7 @@
 #include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
+#include "formats/photos/file_colours.hpp"
 #include "lib/environment/environment_map.hpp"
 
 namespace stx {
@@ -26,10 +27,14 @@ std::string lower(std::string text) {
 
 Result<Texture> readPicture(const fs::path& path, Job& job) {
     STX_TRY(const auto bytes, readFile(path, job.limits));
-    STX_TRY(const auto decoded, decodeImage(bytes, path.string(), job.limits));
+    STX_TRY(auto decoded, decodeImage(bytes, path.string(), job.limits));
+    if (const std::string note = toRec709(decoded); !note.empty()) job.note(note);
     if (decoded.bits() == 16) job.note("16-bit colour is read as 8 bits");
     if (decoded.linear) return Texture(rgbaFloatFrom(decoded));
-    return Texture(rgba8From(decoded));
+    std::string note;
+    Texture picture(photos::srgb8From(decoded, bytes, note));
+    if (!note.empty()) job.note(note);
+    return picture;
 }
 
 /// The file of each face in a folder; empty where there is none.

@@ -411,10 +411,8 @@ namespace {
 /// pixels than their bytes can hold.
 Result<Bundle> bundleWithoutPixels(const ExrReader& reader, ExrBundleHeader header, Job& job) {
     for (const int i : exrViewParts(reader)) STX_CHECK(reader.checkPlausible(i));
-    if (!reader.parts()[0].linearPrimaries)
-        job.note(reader.where() +
-                 ": its primaries are not Rec. 709; colours are taken as if they "
-                 "were");
+    if (const std::string& note = reader.parts()[0].primariesNote; !note.empty())
+        job.note(reader.where() + ": " + note);
     Bundle bundle;
     bundle.title = header.title;
     bundle.bounds = header.bounds;

@@ -145,6 +145,8 @@ Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& 
             // Other programs' pictures of light may have holes in it.
             for (int c = 0; c < 4; ++c)
                 if (!std::isfinite(p[c])) p[c] = 0.0f;
+            if (rgb && part.rec709FromRgb)
+                p = glm::vec4(glm::mat3(*part.rec709FromRgb) * glm::vec3(p), p.a);
         }
         const auto texture = [&](const Image<glm::vec4>& image) {
             return header.linear ? textureFromPremultiplied(image)
@@ -282,9 +284,8 @@ Result<std::shared_ptr<const Environment>> readEnvironmentExr(const std::filesys
                       "it has no environment: no part with the attribute envmap, and its first "
                       "picture of {}x{} is not twice as wide as high",
                       first.width, first.height);
-    if (!reader.parts()[at].linearPrimaries)
-        job.note(reader.where() +
-                 ": its primaries are not Rec. 709; colours are taken as if they were");
+    if (const std::string& note = reader.parts()[at].primariesNote; !note.empty())
+        job.note(reader.where() + ": " + note);
     return readEnvironmentPart(reader, at, job);
 }
 

@@ -68,11 +68,13 @@ Texture straight(const Image<glm::vec4>& premultiplied) {
 /// R, G, B, A of a part, or Y in the place of R.
 struct ColourChannels {
     bool colour, grey, alpha;
+    std::optional<glm::mat3> rec709;  ///< see ExrPart::rec709FromRgb
 
     explicit ColourChannels(const ExrPart& part)
         : colour(part.channel("R") && part.channel("G") && part.channel("B")),
           grey(!colour && part.channel("Y")),
-          alpha(part.channel("A") != nullptr) {}
+          alpha(part.channel("A") != nullptr),
+          rec709(part.rec709FromRgb) {}
 
     void add(glm::vec4* rows, std::vector<ExrPixels>& pixels) const {
         float* at = &rows->x;
@@ -80,8 +82,10 @@ struct ColourChannels {
         if (grey) pixels.push_back({"Y", at, 4});
         if (alpha) pixels.push_back({"A", at + 3, 4});
     }
-    /// What the file has no channels for.
+    /// What the file has no channels for; colours as those of Rec. 709.
     void complete(std::span<glm::vec4> row) const {
+        if (colour && rec709)
+            for (glm::vec4& p : row) p = glm::vec4(*rec709 * glm::vec3(p), p.a);
         if (colour && alpha) return;
         for (glm::vec4& p : row) {
             if (!colour) p.g = p.b = p.r;

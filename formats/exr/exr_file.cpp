@@ -28,6 +28,7 @@
 
 #include "formats/exr/exr_adapt.hpp"
 #include "formats/exr/exr_chunks.hpp"
+#include "formats/exr/exr_primaries.hpp"
 #include "formats/exr/exr_streams.hpp"
 #include "formats/exr/exr_zip.hpp"
 #include "formats/files/file_stamp.hpp"
@@ -78,14 +79,22 @@ void takeAttribute(const Imf::Attribute& a, const std::string& name, ExrPart& pa
            take<Imf::M44dAttribute>(a, name, part, matrix));
 }
 
-bool isRec709(const Imf::Header& header) {
-    if (!Imf::hasChromaticities(header)) return true;
+void takePrimaries(const Imf::Header& header, ExrPart& part) {
+    if (!Imf::hasChromaticities(header)) return;
     const Imf::Chromaticities c = Imf::chromaticities(header), rec709;
     const auto near = [](const Imath::V2f& a, const Imath::V2f& b) {
         return (a - b).length() < 2e-3f;
     };
-    return near(c.red, rec709.red) && near(c.green, rec709.green) && near(c.blue, rec709.blue) &&
-           near(c.white, rec709.white);
+    if (near(c.red, rec709.red) && near(c.green, rec709.green) && near(c.blue, rec709.blue) &&
+        near(c.white, rec709.white))
+        return;
+    const auto vec2 = [](const Imath::V2f& v) { return glm::dvec2(v.x, v.y); };
+    part.rec709FromRgb = rec709From({vec2(c.red), vec2(c.green), vec2(c.blue), vec2(c.white)});
+    part.primariesNote = part.rec709FromRgb
+                             ? "its chromaticities are not those of Rec. 709: colours are "
+                               "converted to these"
+                             : "its chromaticities are no primaries of a white: colours are taken "
+                               "as they are";
 }
 
 ExrPart partFrom(const Imf::Header& header) {
@@ -103,7 +112,7 @@ ExrPart partFrom(const Imf::Header& header) {
     part.screenWindowCenter = {header.screenWindowCenter().x, header.screenWindowCenter().y};
     part.screenWindowWidth = header.screenWindowWidth();
     part.deep = header.hasType() && !Imf::isImage(header.type());
-    part.linearPrimaries = isRec709(header);
+    takePrimaries(header, part);
     if (const auto* envmap = header.findTypedAttribute<Imf::EnvmapAttribute>("envmap")) {
         if (envmap->value() == Imf::ENVMAP_LATLONG) part.envmap = ExrPart::Envmap::latlong;
         if (envmap->value() == Imf::ENVMAP_CUBE) part.envmap = ExrPart::Envmap::cube;

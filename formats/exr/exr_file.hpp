@@ -51,11 +51,14 @@ struct ExrPart {
     /// The standard attribute `envmap`: the picture is all of what is seen around a point.
     enum class Envmap { none, latlong, cube };
     Envmap envmap = Envmap::none;
-    bool deep = false;            ///< deep pixels cannot be read
-    bool linearPrimaries = true;  ///< chromaticities are absent or those of Rec. 709
-    std::string compression;      ///< "zip", "piz", ...; read only
-    int zipLevel = 4;             ///< 1 (fast) to 12, see compressZlib(); written only
-    std::uint64_t bytes = 0;      ///< pixels as they lie in the file; read only, 0 = not known
+    bool deep = false;  ///< deep pixels cannot be read
+    /// Where chromaticities are there and not those of Rec. 709: what R, G, B are multiplied with
+    /// to be of these (rec709From()); read only.
+    std::optional<glm::dmat3> rec709FromRgb;
+    std::string primariesNote;  ///< what readers do about such chromaticities; read only
+    std::string compression;    ///< "zip", "piz", ...; read only
+    int zipLevel = 4;           ///< 1 (fast) to 12, see compressZlib(); written only
+    std::uint64_t bytes = 0;    ///< pixels as they lie in the file; read only, 0 = not known
 
     [[nodiscard]] const ExrChannel* channel(std::string_view name) const;
     /// The attribute when it is there and of that kind.

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <string_view>
+#include <utility>
 
 #include "formats/images/images.hpp"
 #include "lib/base/parallel.hpp"
@@ -37,6 +38,25 @@ ColourChannels colourChannels(const DecodedImage& image) {
 }
 
 }  // namespace
+
+std::string toRec709(DecodedImage& image) {
+    const int r = channelNamed(image, "R"), g = channelNamed(image, "G"),
+              b = channelNamed(image, "B");
+    auto* values = std::get_if<std::vector<float>>(&image.values);
+    if (image.primariesNote.empty() || !values || r < 0 || g < 0 || b < 0) return {};
+    if (image.rec709FromRgb) {
+        const glm::mat3 matrix(*image.rec709FromRgb);
+        for (std::size_t i = 0; i < values->size(); i += static_cast<std::size_t>(image.channels)) {
+            float* const p = values->data() + i;
+            const glm::vec3 rgb = matrix * glm::vec3(p[r], p[g], p[b]);
+            p[r] = rgb.r;
+            p[g] = rgb.g;
+            p[b] = rgb.b;
+        }
+    }
+    image.rec709FromRgb.reset();
+    return std::exchange(image.primariesNote, {});
+}
 
 Image<glm::u8vec4> rgba8From(const DecodedImage& image) {
     Image<glm::u8vec4> out(image.width, image.height);

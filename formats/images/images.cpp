@@ -92,7 +92,8 @@ Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Li
 Result<Image<glm::u8vec4>> decodeRgba8(ByteSpan bytes, std::string_view name,
                                        const Limits& limits) {
     if (bytes.empty() || isExr(bytes) || isOtherKind(bytes)) {
-        STX_TRY(const auto image, decodeImage(bytes, name, limits));
+        STX_TRY(auto image, decodeImage(bytes, name, limits));
+        (void)toRec709(image);
         return rgba8From(image);
     }
     const auto reader = openDirect(bytes, limits);

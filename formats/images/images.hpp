@@ -2,10 +2,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
+
+#include <glm/glm.hpp>
 
 #include "formats/files/files.hpp"
 #include "lib/base/image.hpp"
@@ -37,7 +40,11 @@ struct DecodedImage {
     int usedBits = 0;
     std::vector<std::string> channelNames;  ///< "R", "G", "B", "A", "Y", "Z", …
     bool linear = false;                    ///< float formats (EXR, HDR): linear light
-    bool premultiplied = false;             ///< there is alpha, and colours hold it (EXR, TIFF)
+    /// Of linear colours whose primaries are not those of Rec. 709: what these are multiplied with
+    /// to be so, by toRec709() of those who take the picture for colours.
+    std::optional<glm::dmat3> rec709FromRgb;
+    std::string primariesNote;   ///< what is done about such primaries
+    bool premultiplied = false;  ///< there is alpha, and colours hold it (EXR, TIFF)
     /// Where the stored pixels (EXR: the data window) lie in the picture (the display window), and
     /// the size of that; other formats: 0, 0 and the image's own size.
     int originX = 0, originY = 0;
@@ -58,7 +65,12 @@ struct DecodedImage {
 [[nodiscard]] Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name,
                                                const Limits& limits);
 
-/// The same as rgba8From(decodeImage()); 8-bit PNG and JPEG are decoded into the result at once.
+/// Colours of Rec. 709 in the place of those of other primaries (DecodedImage::rec709FromRgb), for
+/// a picture that has R, G and B; others stay. Gives a note of that; empty: nothing was to be done.
+[[nodiscard]] std::string toRec709(DecodedImage& image);
+
+/// The same as rgba8From(decodeImage()) with toRec709() between them; 8-bit PNG and JPEG are
+/// decoded into the result at once.
 [[nodiscard]] Result<Image<glm::u8vec4>> decodeRgba8(ByteSpan bytes, std::string_view name,
                                                      const Limits& limits);
 

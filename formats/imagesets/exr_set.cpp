@@ -87,11 +87,8 @@ Result<StoredView> loadView(const path& file, const ExrView& view, Job& job) {
     }
     if (alpha) channels.push_back({p + "A", at + 3, 4});
     STX_CHECK(reader.readPart(view.colour.part, channels));
-    if (!colourPart.linearPrimaries)
-        job.note(
-            fmt::format("{}: its primaries are not those of Rec. 709; colours are taken as "
-                        "they are",
-                        reader.where()));
+    if (!colourPart.primariesNote.empty())
+        job.note(reader.where() + ": " + colourPart.primariesNote);
     RgbaFloatImage placed(depthPart.width, depthPart.height);
     const int dx = depthPart.originX - colourPart.originX;
     const int dy = depthPart.originY - colourPart.originY;
@@ -101,6 +98,8 @@ Result<StoredView> loadView(const path& file, const ExrView& view, Job& job) {
             if (!colour.contains(cx, cy)) continue;
             glm::vec4 c = colour.at(cx, cy);
             if (grey) c = glm::vec4(c.x, c.x, c.x, c.w);
+            if (!grey && colourPart.rec709FromRgb)
+                c = glm::vec4(glm::mat3(*colourPart.rec709FromRgb) * glm::vec3(c), c.w);
             if (!std::isfinite(c.x + c.y + c.z + c.w))
                 return failAt(reader.where(), ErrorCode::invalidInput,
                               "view '{}': a colour at column {}, row {} is not finite", view.name,

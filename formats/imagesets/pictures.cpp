@@ -8,6 +8,7 @@
 #include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/text_lines.hpp"
+#include "formats/photos/file_colours.hpp"
 #include "formats/video/film.hpp"
 #include "lib/base/parallel.hpp"
 
@@ -84,8 +85,7 @@ Result<int> depthChannel(const DecodedImage& image, std::string_view name) {
 
 /// Linear floats of integers that code sRGB. Floats are finer than 16 bits everywhere, so that
 /// these come back.
-RgbaFloatImage linearFromCoded(const DecodedImage& image) {
-    RgbaFloatImage out = rgbaFloatFrom(image);
+RgbaFloatImage linearFromCoded(RgbaFloatImage out) {
     parallelFor(0, out.height(), [&](std::int64_t y) {
         for (glm::vec4& c : out.row(static_cast<int>(y)))
             c = {linearFromSrgb(c.r), linearFromSrgb(c.g), linearFromSrgb(c.b), c.a};
@@ -181,15 +181,21 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         STX_TRY(const auto picture, source.film->picture(source.frame));
         if (picture.bits() > 8)
             job.note(fmt::format("colour of {} bits is rounded to 8", picture.bits()));
+        if (const std::string note = picture.notConverted(); !note.empty())
+            job.note(inQuotes(source.name) + ": " + note);
         STX_TRY(auto image, within(inQuotes(source.name), picture.colour(job.limits)));
+        out.alpha = picture.hasAlpha();
         out.texture = std::move(image);
         return out;
     }
     STX_TRY(const auto bytes, readFile(source.path, job.limits));
+    std::string colours;  // what is to be said of them
     if (const auto info = probeImage(bytes); info && info->bits == 8) {
         // What two components of a JPEG are, it does not say.
         out.alpha = info->format == "png" && info->channels % 2 == 0;
         STX_TRY(auto pixels, decodeRgba8(bytes, source.name, job.limits));
+        photos::fileToSrgb(pixels, bytes, colours);
+        if (!colours.empty()) job.note(colours);
         out.texture = std::move(pixels);
         return out;
     }
@@ -197,15 +203,18 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
     out.alpha = image.channelNames.empty() ? image.channels == 2 || image.channels == 4
                                            : channelIn(image, "A") >= 0;
     if (image.bits() == 16 && deep) {
-        out.texture = linearFromCoded(image);
+        out.texture = linearFromCoded(photos::srgbFloatFrom(image, bytes, colours));
+        if (!colours.empty()) job.note(colours);
         return out;
     }
     if (image.bits() < 32) {
         if (image.bits() == 16)
             job.note("colour of 16 bits is rounded to 8; stx convert -o NAME.exr keeps it");
-        out.texture = rgba8From(image);
+        out.texture = photos::srgb8From(image, bytes, colours);
+        if (!colours.empty()) job.note(colours);
         return out;
     }
+    if (const std::string note = toRec709(image); !note.empty()) job.note(note);
     STX_TRY(auto pixels, colourOfFloats(image, source.name));
     out.texture = std::move(pixels);
     return out;

@@ -7,6 +7,7 @@
 #include "formats/images/images.hpp"
 #include "formats/images/reader.hpp"
 #include "formats/photos/colour_profile.hpp"
+#include "formats/photos/file_colours.hpp"
 #include "formats/photos/heif_decode.hpp"
 #include "formats/photos/numbers.hpp"
 #include "formats/photos/readers.hpp"
@@ -282,15 +283,15 @@ Result<Photo> openPhoto(const std::shared_ptr<const Bytes>& file, const PhotoOpt
 Result<Rgba8Image> decodeColour(const Photo& photo, std::string& profileNote, Job& job) {
     const PhotoImage& from = photo.colour;
     Rgba8Image picture;
-    Bytes profile = photo.profile;
     if (from.coding == PhotoImage::Coding::heif) {
         STX_TRY(const auto decoded, decodeHeifItem(from, false, job.limits));
         picture = rgba8From(decoded);
     } else {
         STX_TRY(picture, decodeRgba8(from.bytes, "picture", job.limits));
-        if (isJpeg(from.bytes)) profile = readJpegSegments(from.bytes).profile;
+        fileToSrgb(picture, from.bytes, profileNote);
+        return turnedUpright(std::move(picture), photo.orientation);
     }
-    profileNote = toSrgb(picture, profile);
+    profileNote = toSrgb(picture, photo.profile);
     return turnedUpright(std::move(picture), photo.orientation);
 }
 

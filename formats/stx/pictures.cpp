@@ -4,6 +4,7 @@
 #include "formats/images/exif.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
+#include "formats/photos/file_colours.hpp"
 #include "formats/photos/photo.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/render/compose/environment_behind.hpp"
@@ -100,15 +101,19 @@ Result<Frame> render(const Model& model, const Camera& camera, const RenderSetti
 Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
     STX_TRY(auto bytes, readFile(path, job.limits));
     Picture picture;
+    std::string colours;  // what is to be said of them
     if (photos::isHeif(bytes)) {
         STX_TRY(picture.coded, within(inQuotes(path.string()), heifPicture(std::move(bytes), job)));
         return picture;
     }
     if (const auto info = probeImage(bytes); info && !(info->format == "png" && info->bits > 8)) {
         STX_TRY(picture.coded, decodeUpright(bytes, path.string(), job.limits));
+        photos::fileToSrgb(picture.coded, bytes, colours);
+        if (!colours.empty()) job.note(fmt::format("{}: {}", inQuotes(path.string()), colours));
         return picture;
     }
-    STX_TRY(const auto decoded, decodeImage(bytes, path.string(), job.limits));
+    STX_TRY(auto decoded, decodeImage(bytes, path.string(), job.limits));
+    colours = toRec709(decoded);
     const auto pixels = static_cast<std::uint64_t>(decoded.width) * decoded.height;
     const std::uint64_t bytesEach =
         static_cast<std::uint64_t>(decoded.channels) * decoded.bits() / 8;
@@ -121,8 +126,9 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
     for (const std::string& name : decoded.channelNames)
         if (name != "R" && name != "G" && name != "B" && name != "A" && name != "Y")
             picture.others.push_back(name);
-    if (wanted) floats = rgbaFloatFrom(decoded);
-    picture.coded = rgba8From(decoded);
+    if (wanted) floats = photos::srgbFloatFrom(decoded, bytes, colours);
+    picture.coded = photos::srgb8From(decoded, bytes, colours);
+    if (!colours.empty()) job.note(fmt::format("{}: {}", inQuotes(path.string()), colours));
     const bool isPart =
         decoded.displayWidth > 0 && decoded.displayHeight > 0 &&
         (decoded.originX != 0 || decoded.originY != 0 || decoded.displayWidth != decoded.width ||

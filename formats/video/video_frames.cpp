@@ -1,6 +1,7 @@
 #include "formats/video/video_frames.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <fstream>
 #include <map>
 #include <mutex>
@@ -99,6 +100,7 @@ class FilmFrames final : public VideoFrames {
     [[nodiscard]] int count() const override { return film_->count(); }
     [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
         STX_TRY(const auto picture, film_->picture(k));
+        noteOfColours(picture);
         STX_TRY(auto colour, within(place(k), picture.colour(job_.limits)));
         return std::make_shared<const Rgba8Image>(std::move(colour));
     }
@@ -113,8 +115,16 @@ class FilmFrames final : public VideoFrames {
     }
 
   private:
+    /// Once of a film, not of each frame.
+    void noteOfColours(const VideoPicture& picture) {
+        const std::string note = picture.notConverted();
+        if (!note.empty() && !noted_.exchange(true))
+            job_.note(inQuotes(film_->path().filename().string()) + ": " + note);
+    }
+
     std::unique_ptr<Film> film_;
     Job& job_;
+    std::atomic<bool> noted_ = false;
     glm::ivec2 size_{0};
 };
 

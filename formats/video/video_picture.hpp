@@ -23,11 +23,16 @@ class VideoPicture {
     [[nodiscard]] int bits() const { return header_.bits; }
     /// Luma is there as it was coded; else the picture has colours only.
     [[nodiscard]] bool hasLuma() const { return header_.rgba == 0; }
+    /// Its pixels have alpha, which colour() gives straight; else that is 255.
+    [[nodiscard]] bool hasAlpha() const { return header_.alpha != 0; }
+    /// What the stream says of its colours and colour() does not do, for a note; else empty.
+    [[nodiscard]] std::string notConverted() const;
     /// Its stream says that 16 (of 8 bits) is black; what holds depth should not.
     [[nodiscard]] bool saysLimited() const { return header_.limitedSaid != 0; }
 
-    /// 8-bit colour by the matrix and the range that the stream tells; BT.601 below 720 lines and
-    /// BT.709 from there, of limited range (full where only luma is), where it does not.
+    /// 8-bit colour by the matrix (of YuvMatrix) and the range that the stream tells; BT.601 below
+    /// 720 lines and BT.709 from there, of limited range (full where only luma is), where it does
+    /// not. Primaries and transfer functions are taken for those of sRGB.
     [[nodiscard]] Result<Rgba8Image> colour(const Limits& limits) const;
     /// The values of luma as they are, whatever range the stream tells. Needs hasLuma().
     [[nodiscard]] Image<float> luma() const;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "formats/decoders/wire.hpp"
+#include "formats/yuv/yuv_colour.hpp"
 
 /// What is said between this process and the one that decodes video, beside the messages
 /// themselves: a request and its answer, one after the other.
@@ -10,14 +11,19 @@ using decoders::Packer;
 using decoders::Tag;
 using decoders::Unpacker;
 
-/// How the samples of a picture lie behind this header: planes Y, Cb, Cr from the top, without
-/// gaps, or 8-bit RGBA.
+/// How the samples of a picture lie behind this header: planes Y, Cb, Cr and alpha from the top,
+/// without gaps, or 8-bit RGBA.
 struct PictureHeader {
     std::int32_t width = 0, height = 0;
     std::int32_t bits = 8;  ///< of a sample; above 8 in two bytes, little-endian
     std::int32_t chromaShiftX = 0, chromaShiftY = 0;
-    std::uint8_t chroma = 0, chromaLeft = 0, bt601 = 0, fullRange = 0, rgba = 0;
+    std::uint8_t chroma = 0, chromaLeft = 0;
+    YuvMatrix matrix = YuvMatrix::bt709;  ///< by which it is decoded
+    std::uint8_t fullRange = 0, rgba = 0;
     std::uint8_t limitedSaid = 0;  ///< the stream itself says that its range is limited
+    /// What the stream says of its colours, by the numbers of ITU-T H.273; 2: nothing.
+    std::uint8_t primariesSaid = 2, transferSaid = 2, matrixSaid = 2;
+    std::uint8_t alpha = 0;  ///< the stream has it: a last plane as large as Y, of full range, or A
     std::uint8_t unused[2] = {};
 };
 

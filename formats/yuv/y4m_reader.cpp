@@ -115,7 +115,8 @@ Result<Y4mReader> Y4mReader::open(ByteSource source, Job& job) {
         return failAt(atByte(0), ErrorCode::invalidInput, "it does not begin with {}", kMagic);
     STX_TRY(const auto header, parseHeader(line, job.limits));
     out.format_ = header.format;
-    out.colour_ = {header.format.height < 720, header.fullRange};
+    out.colour_ = {header.format.height < 720 ? YuvMatrix::bt601 : YuvMatrix::bt709,
+                   header.fullRange};
     if (header.interlaced)
         job.note("its frames are interlaced; they are taken as they are, combs and all");
     const std::uint64_t bytes = out.format_.frameBytes();

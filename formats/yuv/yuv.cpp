@@ -39,6 +39,21 @@ Result<std::vector<std::uint16_t>> samplesOf(std::span<const std::byte> raw, con
     return samples;
 }
 
+/// Of red and of blue in Y.
+std::pair<double, double> weightsOf(YuvMatrix matrix) {
+    switch (matrix) {
+        case YuvMatrix::bt601:
+            return {0.299, 0.114};
+        case YuvMatrix::smpte240:
+            return {0.212, 0.087};
+        case YuvMatrix::bt2020:
+            return {0.2627, 0.0593};
+        case YuvMatrix::bt709:
+            break;
+    }
+    return {0.2126, 0.0722};
+}
+
 /// `count` samples from the beginning of a frame.
 Result<std::vector<std::byte>> readFrameBytes(const std::filesystem::path& path, const YuvFormat& f,
                                               int frame, std::uint64_t count,
@@ -129,8 +144,7 @@ Result<Rgba8Image> rgbFromYuv(std::span<const std::byte> frame, const YuvFormat&
     const double yScale = colour.fullRange ? 1 / largest : 1 / (219 * unit);
     const double cZero = 128 * unit;
     const double cScale = colour.fullRange ? 1 / largest : 1 / (224 * unit);
-    const double kr = colour.bt601 ? 0.299 : 0.2126;
-    const double kb = colour.bt601 ? 0.114 : 0.0722;
+    const auto [kr, kb] = weightsOf(colour.matrix);
     const double kg = 1 - kr - kb;
 
     Rgba8Image out(f.width, f.height);

@@ -149,6 +149,27 @@ decoders::PictureFacts factsOf(const OIIO::ImageSpec& spec, const std::string& f
     return facts;
 }
 
+/// White is 0 in a TIFF of PhotometricInterpretation 0 (TIFF 6.0, section 4): its first sample is
+/// white less the value, those beside it (ExtraSamples) are themselves. The library turns all of
+/// them when they have up to 8 bits, and none when they have more.
+void turnWhiteIsZero(const OIIO::ImageSpec& spec, OIIO::TypeDesc type, void* values) {
+    constexpr int kWhiteIsZero = 0;
+    if (spec.get_int_attribute("tiff:PhotometricInterpretation", -1) != kWhiteIsZero) return;
+    const std::size_t samples = static_cast<std::size_t>(spec.nchannels);
+    const std::size_t count = static_cast<std::size_t>(spec.image_pixels()) * samples;
+    const auto turn = [&](auto* at, auto white, bool first) {
+        for (std::size_t i = 0; i < count; ++i)
+            if ((i % samples == 0) == first)
+                at[i] = static_cast<std::remove_pointer_t<decltype(at)>>(white - at[i]);
+    };
+    if (type == OIIO::TypeDesc::UINT8)
+        turn(static_cast<std::uint8_t*>(values), 255, false);
+    else if (type == OIIO::TypeDesc::UINT16)
+        turn(static_cast<std::uint16_t*>(values), 65535, true);
+    else if (spec.format == OIIO::TypeDesc::UINT32)  // as floats of 0 to 1
+        turn(static_cast<float*>(values), 1.0f, true);
+}
+
 /// `fileName`: what the file can be opened by, for formats that the library reads by name only.
 void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
                    const std::string& fileName, PictureAnswer& answer) {
@@ -205,9 +226,11 @@ void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
         throw Failed{ErrorCode::invalidInput,
                      fmt::format("the TIFF is damaged: {}", tiffErrors.first())};
     input->close();
-    if (format == "tiff")
+    if (format == "tiff") {
         if (const std::string damage = damageOfStrips(bytes); !damage.empty())
             throw Failed{ErrorCode::invalidInput, "the TIFF is damaged: " + damage};
+        turnWhiteIsZero(spec, type, values);
+    }
     if (!whole.empty()) pixel.take(whole, static_cast<std::uint8_t*>(values));
 }
 

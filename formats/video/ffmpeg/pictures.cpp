@@ -7,15 +7,19 @@
 namespace stx::video {
 namespace {
 
-/// Luma alone, or luma and chroma, each in a plane of its own, 8 to 16 bits.
+bool hasAlpha(const AVPixFmtDescriptor& format) {
+    return (format.flags & AV_PIX_FMT_FLAG_ALPHA) != 0;
+}
+
+/// Luma alone, or luma and chroma, and alpha, each in a plane of its own, 8 to 16 bits.
 bool isPlanes(const AVPixFmtDescriptor& format) {
     if (format.flags & (AV_PIX_FMT_FLAG_RGB | AV_PIX_FMT_FLAG_PAL | AV_PIX_FMT_FLAG_BITSTREAM |
                         AV_PIX_FMT_FLAG_HWACCEL | AV_PIX_FMT_FLAG_FLOAT | AV_PIX_FMT_FLAG_BAYER))
         return false;
-    const int count = format.nb_components - ((format.flags & AV_PIX_FMT_FLAG_ALPHA) ? 1 : 0);
+    const int count = format.nb_components - (hasAlpha(format) ? 1 : 0);
     if (count != 1 && count != 3) return false;
     if (format.log2_chroma_w > 1 || format.log2_chroma_h > format.log2_chroma_w) return false;
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < format.nb_components; ++i) {
         const AVComponentDescriptor& c = format.comp[i];
         const int bytes = c.depth > 8 ? 2 : 1;
         if (c.plane != i || c.step != bytes || c.offset != 0 || c.shift != 0 || c.depth < 8 ||
@@ -47,12 +51,37 @@ int saidValue(const Enumeration& said) {
     return value;
 }
 
+/// The same of a code of H.273, which libav's numbers are; 2, nothing, of what is none.
+template <class Enumeration>
+std::uint8_t codeSaid(const Enumeration& said) {
+    const int value = saidValue(said);
+    return static_cast<std::uint8_t>(value >= 0 && value < 256 ? value : 2);
+}
+
+YuvMatrix matrixOf(int space, int height) {
+    switch (space) {
+        case AVCOL_SPC_BT470BG:
+        case AVCOL_SPC_SMPTE170M:
+        case AVCOL_SPC_FCC:
+            return YuvMatrix::bt601;
+        case AVCOL_SPC_SMPTE240M:
+            return YuvMatrix::smpte240;
+        case AVCOL_SPC_BT2020_NCL:
+        case AVCOL_SPC_BT2020_CL:
+            return YuvMatrix::bt2020;
+        case AVCOL_SPC_UNSPECIFIED:  // as players take it
+            return height < 720 ? YuvMatrix::bt601 : YuvMatrix::bt709;
+        default:
+            return YuvMatrix::bt709;
+    }
+}
+
 struct FreeScaler {
     void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
 };
 
 /// Other forms of pixels, through libswscale.
-std::vector<std::byte> rgbaOf(const AVFrame& frame, bool bt601, bool fullRange) {
+std::vector<std::byte> rgbaOf(const AVFrame& frame, YuvMatrix of, bool fullRange) {
     const auto width = frame.width, height = frame.height;
     const std::unique_ptr<SwsContext, FreeScaler> scaler(sws_getContext(
         width, height, static_cast<AVPixelFormat>(frame.format), width, height, AV_PIX_FMT_RGBA,
@@ -61,7 +90,10 @@ std::vector<std::byte> rgbaOf(const AVFrame& frame, bool bt601, bool fullRange) 
     if (!scaler)
         refuse(ErrorCode::unsupported, "pixels of the kind {} are not read",
                av_get_pix_fmt_name(static_cast<AVPixelFormat>(frame.format)));
-    const int* matrix = sws_getCoefficients(bt601 ? SWS_CS_ITU601 : SWS_CS_ITU709);
+    const int* matrix = sws_getCoefficients(of == YuvMatrix::bt601      ? SWS_CS_ITU601
+                                            : of == YuvMatrix::smpte240 ? SWS_CS_SMPTE240M
+                                            : of == YuvMatrix::bt2020   ? SWS_CS_BT2020
+                                                                        : SWS_CS_ITU709);
     sws_setColorspaceDetails(scaler.get(), matrix, fullRange ? 1 : 0, matrix, 1, 0, 1 << 16,
                              1 << 16);
     std::vector<std::byte> out(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
@@ -83,8 +115,8 @@ std::vector<std::byte> packed(const AVFrame& frame, const AVCodecContext& codec)
     PictureHeader header;
     header.width = frame.width;
     header.height = frame.height;
-    const bool grey =
-        format->nb_components - ((format->flags & AV_PIX_FMT_FLAG_ALPHA) ? 1 : 0) == 1;
+    header.alpha = hasAlpha(*format);
+    const bool grey = format->nb_components - (hasAlpha(*format) ? 1 : 0) == 1;
     const bool jpegPixels = pixels == AV_PIX_FMT_YUVJ420P || pixels == AV_PIX_FMT_YUVJ422P ||
                             pixels == AV_PIX_FMT_YUVJ444P || pixels == AV_PIX_FMT_YUVJ440P;
     const int range = saidValue(frame.color_range), space = saidValue(frame.colorspace);
@@ -92,10 +124,10 @@ std::vector<std::byte> packed(const AVFrame& frame, const AVCodecContext& codec)
     // Where it is not said, luma alone is of full range, and luma with chroma is not.
     header.fullRange =
         range == AVCOL_RANGE_JPEG || jpegPixels || (grey && range == AVCOL_RANGE_UNSPECIFIED);
-    header.bt601 = space == AVCOL_SPC_BT470BG || space == AVCOL_SPC_SMPTE170M ||
-                   space == AVCOL_SPC_FCC ||
-                   // As players take it.
-                   (space == AVCOL_SPC_UNSPECIFIED && frame.height < 720);
+    header.matrix = matrixOf(space, frame.height);
+    header.primariesSaid = codeSaid(frame.color_primaries);
+    header.transferSaid = codeSaid(frame.color_trc);
+    header.matrixSaid = codeSaid(frame.colorspace);
     int chroma = saidValue(frame.chroma_location);
     if (chroma == AVCHROMA_LOC_UNSPECIFIED) chroma = saidValue(codec.chroma_sample_location);
     header.chromaLeft = chroma == AVCHROMA_LOC_UNSPECIFIED
@@ -105,7 +137,7 @@ std::vector<std::byte> packed(const AVFrame& frame, const AVCodecContext& codec)
     Packer out;
     if (!isPlanes(*format)) {
         header.rgba = 1;
-        const auto rgba = rgbaOf(frame, header.bt601 != 0, header.fullRange != 0);
+        const auto rgba = rgbaOf(frame, header.matrix, header.fullRange != 0);
         out.put(header);
         out.add(rgba.data(), rgba.size());
         return std::move(out.bytes);
@@ -124,6 +156,9 @@ std::vector<std::byte> packed(const AVFrame& frame, const AVCodecContext& codec)
         for (const int plane : {1, 2})
             addPlane(out.bytes, frame, plane, width, height, bytes, bigEndian);
     }
+    if (hasAlpha(*format))
+        addPlane(out.bytes, frame, format->nb_components - 1, frame.width, frame.height, bytes,
+                 bigEndian);
     return std::move(out.bytes);
 }
 

@@ -137,6 +137,44 @@ TEST(Tiff, OneBitIsWhatATiffHasWithoutATag) {
     }
 }
 
+/// PhotometricInterpretation 0 (TIFF 6.0, section 4): grey is stored as white less what it is, of
+/// any number of bits, and what is beside it (ExtraSamples) is not.
+TEST(Tiff, WhiteIsZeroIsTurnedOfAnyBits) {
+    const auto decoded = [](std::uint32_t bits, std::uint32_t zeroIs, std::uint32_t samples) {
+        const Bytes strip = noise(std::size_t{kWidth} * kHeight * bits * samples / 8);
+        std::vector<Tag> tags = {
+            {256, kWidth},  {257, kHeight}, {258, samples == 1 ? bits : bits << 16 | bits},
+            {259, 1},       {262, zeroIs},  {273, 8, 4},
+            {277, samples}, {278, kHeight}, {279, static_cast<std::uint32_t>(strip.size()), 4}};
+        if (samples == 2) tags.push_back({338, 2});  // alpha that colours do not hold
+        Bytes file = tiffOf(strip, tags);
+        // Two values of 16 bits lie in the entry of BitsPerSample.
+        if (samples == 2) file[8 + strip.size() + 2 + 2 * 12 + 4] = std::byte{2};
+        return decodeImage(file, "grey.tif", Limits());
+    };
+    for (const std::uint32_t samples : {1u, 2u})
+        for (const std::uint32_t bits : {8u, 12u, 16u, 32u}) {
+            SCOPED_TRACE(testing::Message() << bits << " bits, " << samples << " samples");
+            const auto white = decoded(bits, 0, samples), black = decoded(bits, 1, samples);
+            ASSERT_TRUE(white) << white.error().text();
+            ASSERT_TRUE(black) << black.error().text();
+            ASSERT_EQ(white->channels, static_cast<int>(samples));
+            ASSERT_EQ(white->bits(), bits == 12 ? 16 : static_cast<int>(bits));
+            std::visit(
+                [&]<class Values>(const Values& values) {
+                    const auto& of = std::get<Values>(black->values);
+                    constexpr bool kFloat = std::is_same_v<Values, std::vector<float>>;
+                    const double all = kFloat ? 1.0 : bits == 8 ? 255.0 : 65535.0;
+                    ASSERT_EQ(values.size(), of.size());
+                    for (std::size_t i = 0; i < values.size(); ++i)
+                        ASSERT_NEAR(values[i], i % samples == 0 ? all - of[i] : of[i],
+                                    kFloat ? 1e-7 : 0)
+                            << i;
+                },
+                white->values);
+        }
+}
+
 /// Two rows of pixels whose bytes are 1, 2, 3, 4, 5, ...; `masks` of a BITMAPV4HEADER.
 Bytes bmpOf(const std::vector<std::uint32_t>& masks) {
     const bool v4 = masks.size() == 4;

@@ -78,6 +78,29 @@ TEST(FilmPairs, AreASetInTime) {
     }
 }
 
+TEST(FilmPairs, AlphaOfColourIsTheSetsOwn) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    writeFilms(folder);
+    films::ffmpeg(folder.path(),
+                  "-i colour.mp4 -vf \"format=rgba,geq=r='r(X,Y)':g='g(X,Y)':b='b(X,Y)':"
+                  "a='if(lt(X,8),0,255)'\" -c:v png colour.mov");
+    ImageSetOptions options = filmOptions();
+    options.texturePattern = "colour.mov";
+    Job job;
+    const auto read = openImageSet(writeCameras(folder, pose(0)), options, job);
+    ASSERT_TRUE(read) << read.error().text();
+    const auto bundle = (*read)->frame(2, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    const ReferenceView& view = bundle->views[0];
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x) {
+            const bool point = x >= 8 && films::code(x, y, 2, 4000) > 0;
+            ASSERT_EQ(view.texture.rgba8()->at(x, y).a, point ? 255 : 0) << x << ' ' << y;
+            ASSERT_EQ(hasPoint(view.depth.at(x, y)), point) << x << ' ' << y;
+        }
+}
+
 TEST(FilmPairs, CamerasMoveByTheirTimes) {
     REQUIRE_VIDEO();
     const TemporaryFolder folder;

@@ -304,7 +304,7 @@ TEST(MivTraps, YuvMatricesAndRangesOf8And10Bits) {
                 writeCodes(folder / "a_depth.png", 8, 6, 16, [](int, int) { return 30000; });
                 writeText(folder / "list.json", mivJson(8, 6, "[1,20]", bits));
                 ImageSetOptions options;
-                options.yuv = {bt601, full};
+                options.yuv = {bt601 ? YuvMatrix::bt601 : YuvMatrix::bt709, full};
                 const auto read = readSet(folder.path(), options);
                 ASSERT_TRUE(read) << read.error().text();
                 const glm::dvec3 got(read->views[0].texture.rgba8()->at(3, 2));

@@ -177,6 +177,139 @@ INSTANTIATE_TEST_SUITE_P(
         std::pair{"f.webm", "-c:v libvpx -pix_fmt yuv420p"}),
     [](const auto& coding) { return std::string(coding.param.first).substr(2); });
 
+struct Coefficients {
+    const char* matrix;  ///< ffmpeg's name
+    double kr, kb;       ///< ITU-T H.273, table 4
+};
+class MatrixOfFilms : public testing::TestWithParam<Coefficients> {};
+
+/// In planes, and as pixels that libswscale converts.
+TEST_P(MatrixOfFilms, IsTheOneThatTheStreamNames) {
+    REQUIRE_VIDEO();
+    const auto& [matrix, kr, kb] = GetParam();
+    const TemporaryFolder folder;
+    const glm::dvec3 colour(1, 0.2, 0.1);
+    const double y = kr * colour.r + (1 - kr - kb) * colour.g + kb * colour.b;
+    const double codes[] = {16 + 219 * y, 128 + 112 * (colour.b - y) / (1 - kb),
+                            128 + 112 * (colour.r - y) / (1 - kr)};
+    Bytes planes;
+    for (const double code : codes)
+        planes.insert(planes.end(), std::size_t{kWide} * kHigh,
+                      static_cast<std::byte>(std::lround(code)));
+    ASSERT_TRUE(writeFile(folder / "c.yuv", planes));
+    for (const char* pixels : {"yuv444p", "yuv411p"}) {
+        SCOPED_TRACE(pixels);
+        films::ffmpeg(folder.path(),
+                      fmt::format("-f rawvideo -pix_fmt yuv444p -s {}x{} -i c.yuv -c:v ffv1 "
+                                  "-pix_fmt {} -color_range tv -colorspace {} f.mkv",
+                                  kWide, kHigh, pixels, matrix));
+        Job job;
+        const auto film = openVideoFrames({folder / "f.mkv"}, job);
+        ASSERT_TRUE(film) << film.error().text();
+        const auto frame = (*film)->frame(0);
+        ASSERT_TRUE(frame) << frame.error().text();
+        const glm::dvec3 got((*frame)->at(20, 10));
+        // Codes are rounded: half a step of Y, Cb and Cr each.
+        for (int k = 0; k < 3; ++k) EXPECT_NEAR(got[k], colour[k] * 255, 2) << "channel " << k;
+        EXPECT_TRUE(job.takeNotes().empty());
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, MatrixOfFilms,
+                         testing::Values(Coefficients{"bt709", 0.2126, 0.0722},
+                                         Coefficients{"smpte170m", 0.299, 0.114},
+                                         Coefficients{"smpte240m", 0.212, 0.087},
+                                         Coefficients{"bt2020nc", 0.2627, 0.0593}),
+                         [](const auto& of) { return std::string(of.param.matrix); });
+
+TEST(Films, ColoursThatAreNotConvertedAreNotedOnce) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    films::writePictures(folder.path(), 3, kWide, kHigh);
+    const auto notesOf = [&](const std::string& said) {
+        films::ffmpeg(folder.path(), "-i c%d.png -c:v libx264 -pix_fmt yuv420p " + said + " f.mp4");
+        Job job;
+        {
+            const auto film = openVideoFrames({folder / "f.mp4"}, job);
+            EXPECT_TRUE(film) << film.error().text();
+            for (int k = 0; film && k < 3; ++k) EXPECT_TRUE((*film)->frame(k));
+        }
+        return job.takeNotes();
+    };
+    constexpr std::string_view kAdvice =
+        "; to convert them first: ffmpeg -i IN -vf zscale=p=709:t=709:m=709 -c:v ffv1 OUT.mkv";
+    EXPECT_TRUE(
+        notesOf("-colorspace smpte170m -color_primaries smpte170m -color_trc smpte170m").empty());
+    EXPECT_TRUE(
+        notesOf("-colorspace bt709 -color_primaries bt709 -color_trc iec61966-2-1").empty());
+    EXPECT_EQ(
+        notesOf("-colorspace bt2020nc -color_primaries bt2020 -color_trc arib-std-b67"),
+        std::vector<std::string>{fmt::format("'f.mp4': colours of the video are taken as they are, "
+                                             "primaries BT.2020 for BT.709, transfer function HLG "
+                                             "for sRGB{}",
+                                             kAdvice)});
+    EXPECT_EQ(
+        notesOf("-colorspace ycgco -color_primaries bt709 -color_trc smpte2084"),
+        std::vector<std::string>{fmt::format("'f.mp4': colours of the video are taken as they are, "
+                                             "transfer function PQ for sRGB, matrix YCgCo for "
+                                             "BT.709{}",
+                                             kAdvice)});
+}
+
+/// File and arguments of a coding with alpha.
+class FilmsWithAlpha : public testing::TestWithParam<std::pair<const char*, const char*>> {};
+
+TEST_P(FilmsWithAlpha, KeepIt) {
+    REQUIRE_VIDEO();
+    const auto& [file, arguments] = GetParam();
+    const TemporaryFolder folder;
+    Rgba8Image picture(kWide, kHigh, {200, 100, 40, 255});
+    for (int y = 0; y < kHigh; ++y)
+        for (int x = 0; x < kWide / 2; ++x) picture.at(x, y).a = x < kWide / 4 ? 0 : 128;
+    const auto png = encodePng(kWide, kHigh, 4, 8, picture.data(), true);
+    ASSERT_TRUE(writeFile(folder / "c0.png", *png));
+    films::ffmpeg(folder.path(), fmt::format("-i c%d.png {} {}", arguments, file));
+    const auto film = openedFilm(folder / file);
+    ASSERT_TRUE(film);
+    const auto decoded = film->picture(0);
+    ASSERT_TRUE(decoded) << decoded.error().text();
+    EXPECT_TRUE(decoded->hasAlpha());
+    const auto colour = decoded->colour({});
+    ASSERT_TRUE(colour);
+    for (const int x : {5, 18, 40}) {
+        const glm::ivec4 is(colour->at(x, 10)), was(picture.at(x, 10));
+        EXPECT_NEAR(is.a, was.a, 1) << "column " << x;
+        for (int k = 0; k < 3; ++k) EXPECT_NEAR(is[k], was[k], 6) << "column " << x;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, FilmsWithAlpha,
+    testing::Values(std::pair{"bgra.mkv", "-c:v ffv1 -pix_fmt bgra"},
+                    std::pair{"png.mov", "-c:v png -pix_fmt rgba"},
+                    std::pair{"yuva.mkv", "-c:v ffv1 -pix_fmt yuva420p"},
+                    std::pair{"prores.mov",
+                              "-c:v prores_ks -profile:v 4444 -pix_fmt yuva444p10le"}),
+    [](const auto& coding) {
+        const std::string file = coding.param.first;
+        return file.substr(0, file.find('.'));
+    });
+
+TEST(Films, WithoutAlphaHaveNone) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    films::writePictures(folder.path(), 1, kWide, kHigh);
+    for (const char* pixels : {"yuv420p", "bgr0"}) {
+        films::ffmpeg(folder.path(), fmt::format("-i c%d.png -c:v ffv1 -pix_fmt {} f.mkv", pixels));
+        const auto film = openedFilm(folder / "f.mkv");
+        ASSERT_TRUE(film);
+        const auto decoded = film->picture(0);
+        ASSERT_TRUE(decoded) << decoded.error().text();
+        EXPECT_FALSE(decoded->hasAlpha()) << pixels;
+        EXPECT_EQ(decoded->colour({})->at(3, 3).a, 255);
+    }
+}
+
 // Cut within a group of pictures: an edit list hides those before, which others need.
 TEST(Films, HiddenPicturesAreDecodedAndNotShown) {
     REQUIRE_VIDEO();

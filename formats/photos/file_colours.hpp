@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+
+#include "formats/images/images.hpp"
+#include "lib/model/texture.hpp"
+
+namespace stx::photos {
+
+/// What the file of a picture says of its colours, as an ICC profile: that of a JPEG, TIFF, WebP or
+/// PNG; or made of the numbers that a PNG has in its place (cICP before iCCP, sRGB, gAMA with cHRM;
+/// PNG, third edition, 4.3). Empty: nothing, or sRGB.
+struct FileColours {
+    Bytes profile;
+    std::string note;  ///< of what it says and nobody here converts
+};
+[[nodiscard]] FileColours coloursOf(ByteSpan file);
+
+/// Makes sRGB of a decoded picture by what its file says. `note` is what was done, or not; empty
+/// where the colours are sRGB already.
+void fileToSrgb(Rgba8Image& picture, ByteSpan file, std::string& note);
+/// rgba8From() as sRGB; 16 bits are rounded behind the conversion. Floats stay as they are.
+[[nodiscard]] Rgba8Image srgb8From(const DecodedImage& image, ByteSpan file, std::string& note);
+/// rgbaFloatFrom() as coded sRGB of 0 to 1. Floats stay as they are.
+[[nodiscard]] RgbaFloatImage srgbFloatFrom(const DecodedImage& image, ByteSpan file,
+                                           std::string& note);
+
+}  // namespace stx::photos
