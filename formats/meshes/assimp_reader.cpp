@@ -379,6 +379,9 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
     if (format == AssimpFormat::fbx) STX_CHECK(checkFbxClaims(bytes, limits));
     if (format == AssimpFormat::stl) STX_CHECK(checkStlEnd(bytes));
     try {
+        std::optional<Bytes> zeros;
+        if (format == AssimpFormat::obj) zeros = withLeadingZeros(bytes);
+        if (zeros) bytes = *zeros;
         std::optional<PlainText> plain;
         if (format == AssimpFormat::obj) plain = plainCoordinates(bytes, "v");
         if (format == AssimpFormat::stl) plain = plainCoordinates(bytes, "vertex");

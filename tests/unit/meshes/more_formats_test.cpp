@@ -80,6 +80,21 @@ TEST(Obj, VerticesWithoutAColourAreWhiteBesideColoured) {
     EXPECT_EQ(coloursOfTwo("# plain", "0 1 0"), (Two{white, green})) << "a comment";
 }
 
+TEST(Obj, NumbersThatBeginWithAPoint) {
+    using Two = std::array<glm::vec4, 2>;
+    const glm::vec4 white(1), red(1, 0, 0, 1);
+    EXPECT_EQ(coloursOfTwo("1 1 1.", "1 .0 .0"), (Two{white, red}));
+    EXPECT_EQ(coloursOfTwo("", "\t1. .0 .0"), (Two{white, red}));
+    const auto half = readGoodText(
+        "# .5 is a half\nv -.5 -.5 .25\nv .5 \\\n.5 .25\nv 0 .5 .25\nvt .5 .25\nf 1/1 2/1 3/1\n",
+        "a.obj");
+    ASSERT_EQ(half.mesh.positions.size(), 3u);
+    EXPECT_EQ(half.mesh.bounds().min, glm::dvec3(-0.5f, -0.5f, 0.25f));
+    EXPECT_EQ(half.mesh.bounds().max, glm::dvec3(0.5f, 0.5f, 0.25f));
+    ASSERT_EQ(half.mesh.uvs.size(), 3u);
+    EXPECT_EQ(half.mesh.uvs[0], glm::vec2(0.5f, 0.75f));
+}
+
 TEST(Mtl, OneValueIsAllThree) {
     TemporaryFolder folder;
     const auto grey = objWith(folder, "Kd 0.5\n");
