@@ -131,6 +131,7 @@ glm::vec3 MaterialSampler::emissive(std::uint32_t triangle, glm::vec3 b) const {
 
 glm::vec3 MaterialSampler::lit(const Lighting& lighting, std::uint32_t triangle, glm::vec3 b,
                                glm::vec3 albedo, glm::vec3 position, glm::vec3 toEye) const {
+    if (mesh_.materials[mesh_.triangleMaterial[triangle]].unlit) return albedo;
     glm::vec3 n = normal(triangle, b);
     if (glm::dot(n, toEye) < 0.0f) n = -n;
     const glm::vec3 glow = glow_ == Glow::inColour ? emissive(triangle, b) : glm::vec3(0.0f);

@@ -30,7 +30,8 @@ class MaterialSampler {
     /// Linear light that it gives off, 0 or more.
     [[nodiscard]] glm::vec3 emissive(std::uint32_t triangle, glm::vec3 barycentric) const;
     /// What `lighting`, of the world, makes of `albedo`, the colour() there: shadePhong(), but that
-    /// the light it gives off is added whatever falls on it. `toEye` is unit.
+    /// the light it gives off is added whatever falls on it, and an unlit material stays as it is.
+    /// `toEye` is unit.
     [[nodiscard]] glm::vec3 lit(const Lighting& lighting, std::uint32_t triangle,
                                 glm::vec3 barycentric, glm::vec3 albedo, glm::vec3 position,
                                 glm::vec3 toEye) const;

@@ -141,6 +141,9 @@ TEST(Rasterise, LightThatASurfaceGivesOffIsAddedToWhatFallsOnIt) {
     EXPECT_FLOAT_EQ(litMiddle(), 1.0f);
     settings.lighting.beyondOne = true;
     EXPECT_NEAR(litMiddle(), 3.1f, 1e-2f);
+    m.emissive = glm::vec3(0.0f);
+    m.unlit = true;
+    EXPECT_NEAR(litMiddle(), 0.2f, 1e-3f);
 }
 
 TEST(Rasterise, AlphaMaskCutsHoles) {

@@ -171,6 +171,18 @@ TEST(Mtl, EmissionShines) {
                glm::vec3(0, 1, 1), 1e-3f);
 }
 
+TEST(GltfUnlit, IsSaidByTheMaterial) {
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.root["extensionsUsed"] = {"KHR_materials_unlit"};
+    gltf.root["materials"] = {
+        {{"extensions", {{"KHR_materials_unlit", nlohmann::json::object()}}}}};
+    gltf.primitive()["material"] = 0;
+    EXPECT_TRUE(readGoodText(gltf.text(), "a.gltf").mesh.materials.at(0).unlit);
+    gltf.root["materials"][0].erase("extensions");
+    EXPECT_FALSE(readGoodText(gltf.text(), "a.gltf").mesh.materials.at(0).unlit);
+}
+
 TEST(GltfEmission, IsAddedWithItsMapAndStrength) {
     GltfText gltf;
     gltf.addQuad();
