@@ -96,8 +96,10 @@ Result<RenderSettings> settingsOf(const RenderOptions& o) {
     s.ownEnvironment =
         !o.environment.given() && (o.background.empty() || o.background == "temporal");
     // What only OpenEXR can hold.
-    if (const auto format = frameFormat(o.output); format && *format == FrameFormat::exr)
-        s.normals = true;
+    const auto format = frameFormat(o.output);
+    const bool exr = format && *format == FrameFormat::exr;
+    if (exr) s.normals = true;
+    s.lighting.beyondOne = exr || o.fileFormat == "exr";
     for (const auto& text : o.lights) {
         if (text == kEnvironmentLight) continue;
         STX_TRY(const auto light, parseLight(text, glm::dvec3(0.0)));

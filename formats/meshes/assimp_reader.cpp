@@ -108,7 +108,9 @@ class SceneConverter {
             }
         }
         float opacity = 1.0f;
-        if (format_ == AssimpFormat::obj && (mtl.hasDissolve || mtl.hasTransparency))
+        // Maps of opacity in scenes are not read; the number beside one means nothing without it.
+        const bool opacityMap = scene && textureOf(source, Use::opacity);
+        if ((scene && !opacityMap) || mtl.hasDissolve || mtl.hasTransparency)
             opacity = source.opacity.value_or(opacity);
         if (opacity <= 0.0f) {
             // Some programs write Tr as d; nobody means an object that cannot be seen.
@@ -132,7 +134,8 @@ class SceneConverter {
         if (textureOf(source, Use::normals))
             STX_SET(m.normalTexture, texture(source, Use::normals));
         for (const auto& [has, label] : {std::pair{source.hasBump, "bump map"},
-                                         {source.hasDisplacement, "displacement map"}}) {
+                                         {source.hasDisplacement, "displacement map"},
+                                         {opacityMap, "opacity map"}}) {
             if (has)
                 files_.job().note(fmt::format("material '{}': its {} is dropped", m.name, label));
         }
@@ -379,6 +382,9 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
     if (format == AssimpFormat::fbx) STX_CHECK(checkFbxClaims(bytes, limits));
     if (format == AssimpFormat::stl) STX_CHECK(checkStlEnd(bytes));
     try {
+        std::optional<Bytes> zeros;
+        if (format == AssimpFormat::obj) zeros = withLeadingZeros(bytes);
+        if (zeros) bytes = *zeros;
         std::optional<PlainText> plain;
         if (format == AssimpFormat::obj) plain = plainCoordinates(bytes, "v");
         if (format == AssimpFormat::stl) plain = plainCoordinates(bytes, "vertex");

@@ -68,7 +68,40 @@ bool eachLine(std::string_view text, std::string_view keyword, const Visit& visi
     return true;
 }
 
+void append(Bytes& to, std::string_view piece) {
+    const auto* first = reinterpret_cast<const std::byte*>(piece.data());
+    to.insert(to.end(), first, first + piece.size());
+}
+
+bool isDigit(char c) {
+    return c >= '0' && c <= '9';
+}
+
 }  // namespace
+
+std::optional<Bytes> withLeadingZeros(ByteSpan bytes) {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    Bytes out;
+    std::size_t copied = 0;
+    bool continued = false, values = false;
+    for (std::size_t start = 0, end = 0; start < text.size(); start = end + 1) {
+        end = std::min(text.find('\n', start), text.size());
+        const auto line = trimmed(text.substr(start, end - start));
+        if (!continued) values = line.starts_with('v');
+        continued = line.ends_with('\\');
+        if (!values) continue;
+        for (auto at = text.find('.', start); at < end; at = text.find('.', at + 1)) {
+            const bool first = at == start || isBlank(text[at - 1]);
+            if (!first || at + 1 >= end || !isDigit(text[at + 1])) continue;
+            append(out, text.substr(copied, at - copied));
+            append(out, "0");
+            copied = at;
+        }
+    }
+    if (out.empty()) return std::nullopt;
+    append(out, text.substr(copied));
+    return out;
+}
 
 std::optional<PlainText> plainCoordinates(ByteSpan bytes, std::string_view keyword) {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -95,19 +128,15 @@ std::optional<PlainText> plainCoordinates(ByteSpan bytes, std::string_view keywo
     // Colours are 0..1, or 0..255 as linearFromSrgbColours() finds.
     const std::string_view white = brightest > 1 ? "255 255 255" : "1 1 1";
     out.text.reserve(text.size() + positions.size() * 8);
-    const auto append = [&](std::string_view piece) {
-        const auto* first = reinterpret_cast<const std::byte*>(piece.data());
-        out.text.insert(out.text.end(), first, first + piece.size());
-    };
     eachLine(text, keyword, [&](std::string_view line, const auto& values) {
         if (!values) {
-            append(line);
+            append(out.text, line);
             return true;
         }
         const auto parsed = *parse(*values);
         const glm::vec3 p(parsed.position - out.origin);
         const auto rest = mixed && !parsed.coloured ? white : parsed.rest;
-        append(fmt::format("{} {} {} {} {}\n", keyword, p.x, p.y, p.z, rest));
+        append(out.text, fmt::format("{} {} {} {} {}\n", keyword, p.x, p.y, p.z, rest));
         return true;
     });
     return out;

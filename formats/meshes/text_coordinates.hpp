@@ -15,6 +15,11 @@ struct PlainText {
     glm::dvec3 origin{0.0};  ///< is subtracted from the coordinates
 };
 
+/// OBJ text in which the numbers of `v`, `vt`, `vn` have a digit before their point: `.5`, which
+/// Wavefront's specification allows, becomes `0.5`, since Assimp counts words that begin with a
+/// digit or a sign only. Nothing when there is no such number.
+[[nodiscard]] std::optional<Bytes> withLeadingZeros(ByteSpan text);
+
 /// Rewrites the lines that begin with `keyword` ("v" of OBJ, "vertex" of STL) where Assimp would
 /// lose what they say:
 ///  - It reads coordinates as floats, which round those of maps (4000000.1 becomes 4000000). So

@@ -158,7 +158,8 @@ Result<Subject> subjectOf(const Mesh& whole, const std::vector<Camera>& cameras,
     return subject;
 }
 
-void noteMaterials(const ViewImageKinds& kinds, const CaptureSettings& settings, Job& job) {
+void noteMaterials(const Mesh& mesh, const ViewImageKinds& kinds, const CaptureSettings& settings,
+                   Job& job) {
     if (settings.materials && !kinds.hasMaterial())
         job.note(
             "the model has neither metallic-roughness nor emissive materials; "
@@ -167,6 +168,10 @@ void noteMaterials(const ViewImageKinds& kinds, const CaptureSettings& settings,
         job.note(
             "what gives off light has it in the emissive images alone, for engines; pictures by "
             "stx render are without it");
+    else if (emits(mesh))
+        job.note(
+            "what gives off light has it in its colour, which --light of stx render dims like "
+            "paint; drawn from the model itself it shines");
 }
 
 std::string nameOf(std::size_t view, const CaptureSettings& settings) {
@@ -266,7 +271,7 @@ Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& camer
     for (const auto& c : cameras) pixels += static_cast<std::uint64_t>(c.width) * c.height;
     STX_CHECK(
         job.limits.checkAllocation(pixels, subject.kinds.bytesPerPixel(), "the reference views"));
-    noteMaterials(subject.kinds, settings, job);
+    noteMaterials(mesh, subject.kinds, settings, job);
 
     const auto n = static_cast<std::int64_t>(cameras.size());
     std::vector<Result<ReferenceView>> views(n, ReferenceView());
@@ -303,7 +308,7 @@ Result<void> withCapturedViews(
     Job& job, const std::function<Result<void>(std::unique_ptr<ViewTable> table, Job& job)>& use) {
     STX_TRY(const auto subject, subjectOf(whole, cameras, settings, job));
     const Mesh& mesh = subject.withoutStrays ? *subject.withoutStrays : whole;
-    noteMaterials(subject.kinds, settings, job);
+    noteMaterials(mesh, subject.kinds, settings, job);
     std::vector<std::size_t> numbers(cameras.size());
     std::iota(numbers.begin(), numbers.end(), std::size_t{0});
     for (;;) {

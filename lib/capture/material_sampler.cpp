@@ -5,6 +5,7 @@
 
 #include "lib/base/rounding.hpp"
 #include "lib/model/srgb8.hpp"
+#include "lib/model/texture.hpp"
 
 namespace stx {
 namespace {
@@ -93,6 +94,10 @@ MaterialSampler::MaterialSampler(const Mesh& mesh, Glow glow) : mesh_(mesh), glo
 }
 
 glm::vec4 MaterialSampler::colour(std::uint32_t triangle, glm::vec3 b) const {
+    return colour(triangle, b, glow_);
+}
+
+glm::vec4 MaterialSampler::colour(std::uint32_t triangle, glm::vec3 b, Glow where) const {
     const auto material = mesh_.triangleMaterial[triangle];
     const auto& m = mesh_.materials[material];
     const auto& t = mesh_.triangles[triangle];
@@ -102,7 +107,7 @@ glm::vec4 MaterialSampler::colour(std::uint32_t triangle, glm::vec3 b) const {
     if (plainTexture_[material]) return texel;
     glm::vec4 factor = m.baseColour;
     if (!mesh_.colours.empty()) factor *= mix3(mesh_.colours, t, b);
-    const glm::vec3 glow = glow_ == Glow::inColour ? emissive(triangle, b) : glm::vec3(0.0f);
+    const glm::vec3 glow = where == Glow::inColour ? emissive(triangle, b) : glm::vec3(0.0f);
     glm::vec4 out;
     for (int k = 0; k < 3; ++k) {
         const float light = (m.baseColourTexture >= 0 ? linearByTable(texel[k]) : 1.0f) * factor[k];
@@ -122,6 +127,22 @@ glm::vec3 MaterialSampler::emissive(std::uint32_t triangle, glm::vec3 b) const {
         for (int k = 0; k < 3; ++k) emissive[k] *= linearByTable(glow[k]);
     }
     return emissive;
+}
+
+glm::vec3 MaterialSampler::lit(const Lighting& lighting, std::uint32_t triangle, glm::vec3 b,
+                               glm::vec3 albedo, glm::vec3 position, glm::vec3 toEye) const {
+    if (mesh_.materials[mesh_.triangleMaterial[triangle]].unlit) return albedo;
+    glm::vec3 n = normal(triangle, b);
+    if (glm::dot(n, toEye) < 0.0f) n = -n;
+    const glm::vec3 glow = glow_ == Glow::inColour ? emissive(triangle, b) : glm::vec3(0.0f);
+    if (glow == glm::vec3(0.0f)) return shadePhong(lighting, albedo, position, n, toEye, false);
+    const glm::vec3 bare(colour(triangle, b, Glow::apart));
+    glm::vec3 out = shadePhong(lighting, bare, position, n, toEye, false);
+    for (int k = 0; k < 3; ++k) {
+        const float light = linearFromSrgb(out[k]) + glow[k];
+        out[k] = lighting.beyondOne ? srgbFromLinear(light) : srgbByTable(light);
+    }
+    return out;
 }
 
 glm::vec2 MaterialSampler::metallicRoughness(std::uint32_t triangle, glm::vec3 b) const {

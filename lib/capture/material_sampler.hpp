@@ -4,6 +4,7 @@
 
 #include <glm/glm.hpp>
 
+#include "lib/light/lighting.hpp"
 #include "lib/model/mesh.hpp"
 
 namespace stx {
@@ -28,6 +29,12 @@ class MaterialSampler {
     [[nodiscard]] glm::vec2 metallicRoughness(std::uint32_t triangle, glm::vec3 barycentric) const;
     /// Linear light that it gives off, 0 or more.
     [[nodiscard]] glm::vec3 emissive(std::uint32_t triangle, glm::vec3 barycentric) const;
+    /// What `lighting`, of the world, makes of `albedo`, the colour() there: shadePhong(), but that
+    /// the light it gives off is added whatever falls on it, and an unlit material stays as it is.
+    /// `toEye` is unit.
+    [[nodiscard]] glm::vec3 lit(const Lighting& lighting, std::uint32_t triangle,
+                                glm::vec3 barycentric, glm::vec3 albedo, glm::vec3 position,
+                                glm::vec3 toEye) const;
     /// Whether the surface is there at all (alpha mask).
     [[nodiscard]] bool opaqueAt(std::uint32_t triangle, glm::vec3 barycentric) const;
     /// This triangle can have see-through points, so opaqueAt() must be asked.
@@ -59,6 +66,7 @@ class MaterialSampler {
     [[nodiscard]] glm::vec3 normal(std::uint32_t triangle, glm::vec3 barycentric) const;
 
   private:
+    [[nodiscard]] glm::vec4 colour(std::uint32_t triangle, glm::vec3 barycentric, Glow glow) const;
     /// The texture coordinates of a texture that may have some of its own.
     [[nodiscard]] const std::vector<glm::vec2>& uvsOr(const std::vector<glm::vec2>& own) const {
         return own.empty() ? mesh_.uvs : own;

@@ -333,9 +333,7 @@ glm::vec3 Rasterizer::lit(const Lighting& lighting, const SetUp& s, glm::vec3 al
     const glm::vec3 position(camera_.position +
                              camera_.orientation * camera_.unproject(x, y, dist));
     const glm::vec3 toEye = -glm::vec3(camera_.viewDirection(x, y));
-    glm::vec3 n = sampler_.normal(s.triangle, barycentric(s, x, y));
-    if (glm::dot(n, toEye) < 0.0f) n = -n;
-    return shadePhong(lighting, albedo, position, n, toEye, false);
+    return sampler_.lit(lighting, s.triangle, barycentric(s, x, y), albedo, position, toEye);
 }
 
 /// Whether all samples of a pixel see the same triangle, or none.

@@ -1,6 +1,9 @@
 #include "lib/light/lighting.hpp"
 
+#include <limits>
+
 #include "lib/model/srgb8.hpp"
+#include "lib/model/texture.hpp"
 #include "shaders/shared/language.hpp"
 
 namespace stx {
@@ -30,9 +33,13 @@ struct Phong {
     [[nodiscard]] static vec3 decoded(vec3 c) {
         return {linearByTable(c.x), linearByTable(c.y), linearByTable(c.z)};
     }
-    [[nodiscard]] static vec3 coded(vec3 c) {
-        return {srgbByTable(c.x), srgbByTable(c.y), srgbByTable(c.z)};
+    [[nodiscard]] float brightest() const {
+        return lighting.beyondOne ? std::numeric_limits<float>::max() : 1.0f;
     }
+    [[nodiscard]] static float coded(float c) {
+        return c > 1.0f ? srgbFromLinear(c) : srgbByTable(c);
+    }
+    [[nodiscard]] static vec3 coded(vec3 c) { return {coded(c.x), coded(c.y), coded(c.z)}; }
 #include "shaders/shared/phong.glsl"
 };
 

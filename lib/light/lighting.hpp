@@ -28,13 +28,17 @@ struct Lighting {
     glm::vec3 ambient{0.2f};
     glm::vec3 specular{0.0f};
     float shininess = 32.0f;  ///< exponent, > 0
+    /// sRGB-coded colours grow beyond 1 in much light, as linear ones do, and the coding goes on
+    /// there. For pictures of floats.
+    bool beyondOne = false;
 
     [[nodiscard]] bool on() const { return !lights.empty() || environment; }
 };
 
 /// Phong: albedo * (ambient + sum of diffuse) + sum of specular, in linear light. All vectors in
 /// one space; `toEye` and `normal` unit, `position` the lit point. Unless `linear`, albedo and
-/// result are sRGB-coded, 0..1: decoded, lit, coded again. The shaders share its code.
+/// result are sRGB-coded, 0..1 but for `beyondOne`: decoded, lit, coded again. The shaders share
+/// its code.
 [[nodiscard]] glm::vec3 shadePhong(const Lighting& lighting, glm::vec3 albedo, glm::vec3 position,
                                    glm::vec3 normal, glm::vec3 toEye, bool linear);
 

@@ -42,6 +42,7 @@ struct Material {
     Alpha alpha = Alpha::opaque;
     float alphaCutoff = 0.5f;  ///< for Alpha::mask
     bool doubleSided = true;   ///< false: back faces are not drawn
+    bool unlit = false;        ///< keeps its colour under lights (KHR_materials_unlit)
     bool hasColour = true;     ///< false: nobody gave a colour, baseColour is white for lack of one
 };
 

@@ -3,7 +3,8 @@
 //   vec4 lightVector(i)  w = 0: the way the light travels, w = 1: its position
 //   vec3 environmentDiffuse(vec3 normal), vec3 environmentGloss(vec3 direction)  0 where there is
 //   none
-//   vec3 decoded(vec3), vec3 coded(vec3)  sRGB to linear light and back, 0..1
+//   vec3 decoded(vec3), vec3 coded(vec3)  sRGB to linear light, 0..1, and back, from 0
+//   float brightest()  the linear light at which sRGB-coded colours stop
 // All vectors in one space; `normal` and `toEye` of length 1.
 vec3 shadePhong(vec3 albedo, vec3 position, vec3 normal, vec3 toEye) {
     vec3 diffuse = ambientLight() + environmentDiffuse(normal);
@@ -25,5 +26,5 @@ vec3 shadePhong(vec3 albedo, vec3 position, vec3 normal, vec3 toEye) {
 
 // Light adds up only as linear light: sRGB-coded colours are decoded for it, and coded again.
 vec3 shadeCoded(vec3 albedo, vec3 position, vec3 normal, vec3 toEye) {
-    return coded(shadePhong(decoded(albedo), position, normal, toEye));
+    return coded(min(shadePhong(decoded(albedo), position, normal, toEye), vec3(brightest())));
 }

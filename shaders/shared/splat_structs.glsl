@@ -6,7 +6,7 @@ struct FrameUniforms {
     ivec4 counts;        // reference views, tasks of this draw, first task of this draw, lights
     vec4 novelLens;      // 1 / fx, 1 / fy, cx, cy
     vec4 novelAxisX;     // world; w = 1 when orthographic
-    vec4 novelAxisY;     // world
+    vec4 novelAxisY;     // world; w = the linear light at which lit sRGB-coded colours stop
     vec4 novelAxisZ;     // world
     vec4 novelPosition;  // world; w = diameter of the paper's splat in pixels times distance
     vec4 scales;         // weight, colour, nearest and farthest distance (raster depth)

@@ -44,5 +44,6 @@ vec3 environmentGloss(vec3 d) {
 }
 vec3 specularLight() { return frame.specular.rgb; }
 float shininess() { return frame.specular.w; }
+float brightest() { return frame.novelAxisY.w; }
 int lightCount() { return frame.counts.w; }
 #include "shared/srgb.glsl"

@@ -250,6 +250,8 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
     }
     if (object->contains("occlusionTexture")) ++dropped["occlusion maps"];
     STX_CHECK(readEmissive(*object, where, m, use));
+    STX_TRY(const Json* unlit, getExtension(*object, "KHR_materials_unlit", where));
+    m.unlit = unlit != nullptr;
     STX_TRY(const auto alphaMode, getString(*object, "alphaMode", where));
     if (alphaMode == "MASK") {
         m.alpha = Material::Alpha::mask;

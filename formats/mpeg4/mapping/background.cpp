@@ -38,22 +38,20 @@ void readGradient(const Node& node, const char* what, std::vector<glm::vec3>& co
             what, what, colours.size(), stored.size()));
 }
 
-/// The mean colour, sRGB-coded, of the uppermost (side 1) or lowest (-1) band that shows something.
+/// The mean colour, sRGB-coded, of the uppermost (side 1) or lowest (-1) bands that show something:
+/// as many as cover half a band. Nothing where all is transparent.
 std::optional<glm::vec3> poleColour(const EnvironmentMap& map, int side) {
     constexpr int kBands = 36, kAround = 72;
-    for (int band = 0; band < kBands; ++band) {
-        glm::vec4 sum(0.0f);
+    glm::vec4 sum(0.0f);
+    for (int band = 0; band < kBands && sum.a <= 0.5f * kAround; ++band) {
         for (int i = 0; i < kAround; ++i) {
             const glm::dvec3 d = latlongDirection({(i + 0.5) / kAround, (band + 0.5) / kBands});
             sum += map.sampleTurned(glm::vec3(d.x, side * d.y, d.z), 0.05f, true);
         }
-        if (sum.a > 0.5f * kAround) {
-            const glm::vec3 light = glm::vec3(sum) / sum.a;
-            return glm::vec3(srgbFromLinear(light.r), srgbFromLinear(light.g),
-                             srgbFromLinear(light.b));
-        }
     }
-    return {};
+    if (!(sum.a > 0.0f)) return {};
+    const glm::vec3 light = glm::vec3(sum) / sum.a;
+    return glm::vec3(srgbFromLinear(light.r), srgbFromLinear(light.g), srgbFromLinear(light.b));
 }
 
 void setGradient(Node& node, const char* what, const std::vector<glm::vec3>& colours,

@@ -17,6 +17,7 @@ vec3 environmentDiffuse(vec3 n) { return vec3(0.0); }
 vec3 environmentGloss(vec3 d) { return vec3(0.0); }
 vec3 specularLight() { return vec3(lightAmounts.z); }
 float shininess() { return lightAmounts.w; }
+float brightest() { return 1.0; }
 int lightCount() { return 1; }
 vec4 lightVector(int i) { return vec4(lightDirection, 0.0); }
 vec3 lightColour(int i) { return vec3(lightAmounts.x); }

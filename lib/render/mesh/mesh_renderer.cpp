@@ -1,5 +1,7 @@
 #include "lib/render/mesh/mesh_renderer.hpp"
 
+#include <algorithm>
+
 #include "lib/capture/rasterizer.hpp"
 
 namespace stx {
@@ -39,6 +41,8 @@ Result<Frame> MeshRenderer::render(const Camera& camera) {
 
 std::unique_ptr<Renderer> makeMeshRenderer(const Mesh& mesh, const RenderSettings& settings,
                                            Job& job) {
+    if (settings.lighting.on() && std::ranges::any_of(mesh.materials, &Material::unlit))
+        job.note("materials that are unlit (KHR_materials_unlit) keep their colour under lights");
     return std::make_unique<MeshRenderer>(mesh, settings, job);
 }
 

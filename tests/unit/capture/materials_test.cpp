@@ -124,6 +124,17 @@ TEST(CapturedMaterials, LightIsInTheColourOrApart) {
     EXPECT_NEAR(apart.b, base, 1);
     const Bundle plain = captured({});
     EXPECT_FALSE(plain.hasMaterial());
+    Job job;
+    ASSERT_TRUE(captureBundle(square(Material(), {}), {before()}, {}, job));
+    EXPECT_TRUE(job.takeNotes().empty());
+    Material glows;
+    glows.emissive = glm::vec3(0.5f);
+    ASSERT_TRUE(captureBundle(square(glows, {}), {before()}, {}, job));
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_EQ(notes[0],
+              "what gives off light has it in its colour, which --light of stx render dims like "
+              "paint; drawn from the model itself it shines");
     const auto together = plain.views.at(0).texture.rgba8()->at(4, 8);
     EXPECT_EQ(together.r, 255);
     EXPECT_NEAR(together.b, base, 1);

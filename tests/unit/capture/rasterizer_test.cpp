@@ -120,6 +120,32 @@ TEST(Rasterise, BackFacesOfSingleSidedMaterialsAreOpen) {
     EXPECT_NEAR(inverted->depth.at(16, 16), 5.0, 0.02) << "turned inside out, the far wall shows";
 }
 
+TEST(Rasterise, LightThatASurfaceGivesOffIsAddedToWhatFallsOnIt) {
+    const Camera camera = lookingAt({0, 0, 3}, 16);
+    Mesh mesh = sphereMesh(32);
+    RasterSettings settings;
+    settings.lighting.ambient = glm::vec3(0.5f);
+    settings.lighting.lights = {{Light::Kind::directional, {0, 0, 1}, glm::vec3(1), false}};
+    const auto litMiddle = [&] {
+        Job job;
+        const auto image = rasterise(mesh, camera, settings, job);
+        EXPECT_TRUE(image) << image.error().text();
+        return image ? linearFromSrgb(image->lit.at(8, 8).x) : -1.0f;
+    };
+    Material& m = mesh.materials[0];
+    m.baseColour = glm::vec4(0.2f, 0.2f, 0.2f, 1);
+    EXPECT_NEAR(litMiddle(), 0.1f, 1e-3f);
+    m.emissive = glm::vec3(0.3f);
+    EXPECT_NEAR(litMiddle(), 0.4f, 1e-3f);
+    m.emissive = glm::vec3(3.0f);
+    EXPECT_FLOAT_EQ(litMiddle(), 1.0f);
+    settings.lighting.beyondOne = true;
+    EXPECT_NEAR(litMiddle(), 3.1f, 1e-2f);
+    m.emissive = glm::vec3(0.0f);
+    m.unlit = true;
+    EXPECT_NEAR(litMiddle(), 0.2f, 1e-3f);
+}
+
 TEST(Rasterise, AlphaMaskCutsHoles) {
     Mesh m;
     Material cut;

@@ -1,6 +1,7 @@
 // What pixels without depth are: nothing, or a surface whose distance is not known.
 
 #include <cmath>
+#include <functional>
 
 #include "lib/render/factory.hpp"
 #include "tests/naive_warp.hpp"
@@ -190,6 +191,25 @@ TEST(NoDepth, MasksOfTheSetAreRead) {
     ImageSetOptions strict;
     strict.strict = true;
     expectError(readSet(folder.path(), strict), {"masks/m.png"});
+}
+
+TEST(NoDepth, MasksOfOneValueBesideZeroAreWhiteThere) {
+    const TemporaryFolder folder;
+    writeSet(folder.path(), roomViews(), nullptr, ",\"mask_path\":\"m.png\"");
+    const auto alphaWith = [&](const std::function<int(int, int)>& mask) {
+        writeCodes(folder / "m.png", kWidth, kHeight, 8, mask);
+        const auto read = readSet(folder.path());
+        EXPECT_TRUE(read) << read.error().text();
+        return read ? read->views[0].texture.at(65, 30).a : -1.0f;
+    };
+    for (const int value : {1, 15, 255}) {
+        SCOPED_TRACE(value);
+        EXPECT_EQ(alphaWith([&](int x, int) { return x >= 60 ? value : 0; }), 1.0f);
+        EXPECT_EQ(alphaWith([&](int x, int) { return x < 60 ? value : 0; }), 0.0f);
+        EXPECT_EQ(alphaWith([&](int, int) { return value; }), 1.0f);
+    }
+    // Of several values each is a share.
+    EXPECT_NEAR(alphaWith([](int x, int) { return x > 65 ? 255 : x == 65 ? 51 : 0; }), 0.2f, 1e-6f);
 }
 
 /// COLMAP appends .png to the picture's name; others replace its ending.

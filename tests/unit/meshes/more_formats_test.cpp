@@ -80,6 +80,21 @@ TEST(Obj, VerticesWithoutAColourAreWhiteBesideColoured) {
     EXPECT_EQ(coloursOfTwo("# plain", "0 1 0"), (Two{white, green})) << "a comment";
 }
 
+TEST(Obj, NumbersThatBeginWithAPoint) {
+    using Two = std::array<glm::vec4, 2>;
+    const glm::vec4 white(1), red(1, 0, 0, 1);
+    EXPECT_EQ(coloursOfTwo("1 1 1.", "1 .0 .0"), (Two{white, red}));
+    EXPECT_EQ(coloursOfTwo("", "\t1. .0 .0"), (Two{white, red}));
+    const auto half = readGoodText(
+        "# .5 is a half\nv -.5 -.5 .25\nv .5 \\\n.5 .25\nv 0 .5 .25\nvt .5 .25\nf 1/1 2/1 3/1\n",
+        "a.obj");
+    ASSERT_EQ(half.mesh.positions.size(), 3u);
+    EXPECT_EQ(half.mesh.bounds().min, glm::dvec3(-0.5f, -0.5f, 0.25f));
+    EXPECT_EQ(half.mesh.bounds().max, glm::dvec3(0.5f, 0.5f, 0.25f));
+    ASSERT_EQ(half.mesh.uvs.size(), 3u);
+    EXPECT_EQ(half.mesh.uvs[0], glm::vec2(0.5f, 0.75f));
+}
+
 TEST(Mtl, OneValueIsAllThree) {
     TemporaryFolder folder;
     const auto grey = objWith(folder, "Kd 0.5\n");
@@ -154,6 +169,18 @@ TEST(Mtl, EmissionShines) {
     writePair(folder / "glow.png", {0, 0, 255, 255}, {0, 0, 255, 255});
     expectNear(glm::vec3(colourOf(objWith(folder, "Kd 0 1 0\nmap_Ke glow.png\n").mesh)),
                glm::vec3(0, 1, 1), 1e-3f);
+}
+
+TEST(GltfUnlit, IsSaidByTheMaterial) {
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.root["extensionsUsed"] = {"KHR_materials_unlit"};
+    gltf.root["materials"] = {
+        {{"extensions", {{"KHR_materials_unlit", nlohmann::json::object()}}}}};
+    gltf.primitive()["material"] = 0;
+    EXPECT_TRUE(readGoodText(gltf.text(), "a.gltf").mesh.materials.at(0).unlit);
+    gltf.root["materials"][0].erase("extensions");
+    EXPECT_FALSE(readGoodText(gltf.text(), "a.gltf").mesh.materials.at(0).unlit);
 }
 
 TEST(GltfEmission, IsAddedWithItsMapAndStrength) {
@@ -271,6 +298,112 @@ TEST(MoreFormats, OffColladaAndFbx) {
         EXPECT_NEAR(model.mesh.bounds().radius(), std::sqrt(2.0) / 2, 1e-5) << ending;
         expectNear(glm::vec3(colourOf(model.mesh)), glm::vec3(1, 0, 0), 1e-2f);
     }
+}
+
+/// A quad of COLLADA with `transparency` in its effect.
+ReadModel daeWith(const std::string& transparency) {
+    return readGoodText(
+        R"(<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset/>
+<library_effects><effect id="e"><profile_COMMON><technique sid="c"><lambert>
+<diffuse><color>0.2 0.5 0.8 1</color></diffuse>)" +
+            transparency + R"(</lambert></technique></profile_COMMON></effect></library_effects>
+<library_materials><material id="m" name="glass"><instance_effect url="#e"/></material>
+</library_materials><library_geometries><geometry id="g"><mesh><source id="p">
+<float_array id="a" count="9">0 0 0 1 0 0 0 1 0</float_array><technique_common>
+<accessor source="#a" count="3" stride="3"><param name="X" type="float"/>
+<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices><triangles material="mm"
+count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles></mesh>
+</geometry></library_geometries><library_visual_scenes><visual_scene id="s"><node>
+<instance_geometry url="#g"><bind_material><technique_common><instance_material symbol="mm"
+target="#m"/></technique_common></bind_material></instance_geometry></node></visual_scene>
+</library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>)",
+        "a.dae");
+}
+
+TEST(Collada, TranslucencyIsAlpha) {
+    const auto alpha = [](const std::string& mode, const std::string& colour,
+                          const std::string& transparency) {
+        const auto model = daeWith("<transparent" + mode + "><color>" + colour +
+                                   "</color></transparent><transparency><float>" + transparency +
+                                   "</float></transparency>");
+        EXPECT_TRUE(model.notes.empty()) << model.notes[0];
+        return colourOf(model.mesh).a;
+    };
+    EXPECT_FLOAT_EQ(alpha("", "1 1 1 1", "0.5"), 0.5f);
+    EXPECT_FLOAT_EQ(alpha(" opaque=\"A_ONE\"", "0 0 0 0.5", "1"), 0.5f);
+    EXPECT_FLOAT_EQ(alpha(" opaque=\"RGB_ZERO\"", "1 1 1 1", "0.25"), 0.75f);
+    EXPECT_FLOAT_EQ(alpha(" opaque=\"RGB_ZERO\"", "0 0 0 1", "1"), 1.0f);
+    const auto unseen = daeWith("<transparency><float>0</float></transparency>");
+    EXPECT_TRUE(unseen.hasNote("material 'glass' would be invisible; it is taken as opaque"));
+    const auto picture = daeWith(
+        "<transparent opaque=\"RGB_ZERO\"><texture texture=\"t.png\" texcoord=\"x\"/>"
+        "</transparent><transparency><float>1</float></transparency>");
+    ASSERT_EQ(picture.notes.size(), 1u);
+    EXPECT_EQ(picture.notes[0], "material 'glass': its opacity map is dropped");
+    EXPECT_FLOAT_EQ(colourOf(picture.mesh).a, 1.0f);
+}
+
+/// A triangle of FBX, as text, with `properties` in its material.
+ReadModel fbxWith(const std::string& properties) {
+    return readGoodText(
+        R"(; FBX 7.4.0 project file
+FBXHeaderExtension:  {
+	FBXVersion: 7400
+}
+Objects:  {
+	Geometry: 10, "Geometry::g", "Mesh" {
+		Vertices: *9 {
+			a: 0,0,0,1,0,0,0,1,0
+		}
+		PolygonVertexIndex: *3 {
+			a: 0,1,-3
+		}
+		LayerElementMaterial: 0 {
+			MappingInformationType: "AllSame"
+			ReferenceInformationType: "IndexToDirect"
+			Materials: *1 {
+				a: 0
+			}
+		}
+		Layer: 0 {
+			LayerElement:  {
+				Type: "LayerElementMaterial"
+				TypedIndex: 0
+			}
+		}
+	}
+	Model: 20, "Model::q", "Mesh" {
+		Version: 232
+	}
+	Material: 30, "Material::m", "" {
+		ShadingModel: "phong"
+		Properties70:  {
+			P: "DiffuseColor", "Color", "", "A",0.2,0.5,0.8
+)" + properties +
+            R"(
+		}
+	}
+}
+Connections:  {
+	C: "OO",20,0
+	C: "OO",10,20
+	C: "OO",30,20
+}
+)",
+        "a.fbx");
+}
+
+TEST(Fbx, TranslucencyIsAlpha) {
+    const std::string factor = R"(P: "TransparencyFactor", "Number", "", "A",)";
+    const std::string colour = R"(P: "TransparentColor", "Color", "", "A",)";
+    const std::string opacity = R"(P: "Opacity", "double", "Number", "",)";
+    EXPECT_FLOAT_EQ(colourOf(fbxWith("").mesh).a, 1.0f);
+    const auto maya = fbxWith(colour + "0.25,0.25,0.25\n" + factor + "1\n" + opacity + "0.75");
+    EXPECT_FLOAT_EQ(colourOf(maya.mesh).a, 0.75f);
+    EXPECT_FLOAT_EQ(colourOf(fbxWith(colour + "1,1,1\n" + factor + "0.25").mesh).a, 0.75f);
+    EXPECT_FLOAT_EQ(colourOf(fbxWith(colour + "1,1,1\n" + factor + "0").mesh).a, 1.0f);
 }
 
 TEST(MoreFormats, DeepNestingAndLargeClaimsAreRefused) {

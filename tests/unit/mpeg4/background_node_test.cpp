@@ -131,6 +131,24 @@ TEST(BackgroundNode, APictureAllAroundBecomesSixFaces) {
             0.01);
 }
 
+TEST(BackgroundNode, ATranslucentEnvironmentHasItsMeanColoursBehindIt) {
+    for (const std::uint8_t alpha : {13, 64, 127, 128, 254}) {
+        SCOPED_TRACE(alpha);
+        Environment e;
+        e.layout = Environment::Layout::equirectangular;
+        e.pictures.emplace_back(Rgba8Image(64, 32, glm::u8vec4(124, 60, 200, alpha)));
+        Job job;
+        const auto document = sceneFromBundle(viewWith(e), {}, job);
+        ASSERT_TRUE(document) << document.error().text();
+        const auto back = environmentFromScene(*document, {}, job);
+        ASSERT_TRUE(back && *back);
+        ASSERT_EQ((*back)->skyColours.size(), 1u);
+        ASSERT_EQ((*back)->groundColours.size(), 2u);
+        for (const glm::vec3 colour : {(*back)->skyColours[0], (*back)->groundColours[1]})
+            EXPECT_LT(glm::distance(colour, glm::vec3(124, 60, 200) / 255.0f), 0.002f);
+    }
+}
+
 TEST(BackgroundNode, FilmsHaveOneForAllFrames) {
     Job job;
     const TemporaryFolder folder;

@@ -37,5 +37,14 @@ TEST(Lighting, LinearColoursMayGrowBeyondOneAndCodedOnesStopThere) {
     EXPECT_FLOAT_EQ(lit(oneLight(3.0f), 0.9f, false).x, 1.0f);
 }
 
+TEST(Lighting, CodedColoursGrowBeyondOneWhereTheyMay) {
+    Lighting lighting = oneLight(3.0f);
+    lighting.beyondOne = true;
+    for (const float coded : {0.1f, 0.5f, 0.9f, 1.0f}) {
+        const float light = linearFromSrgb(lit(lighting, coded, false).x);
+        EXPECT_NEAR(light, 3.0f * linearFromSrgb(coded), 1e-3f) << coded;
+    }
+}
+
 }  // namespace
 }  // namespace stx

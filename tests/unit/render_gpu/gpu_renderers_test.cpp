@@ -163,6 +163,26 @@ TEST_P(GpuRenderers, LightAsTheCpuDoes) {
     EXPECT_GT(looked, 50);
 }
 
+TEST_P(GpuRenderers, KeepLightBeyondOneWhereTheyMay) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 4, 2);
+    RenderSettings s = settings();
+    s.lighting.lights = {{Light::Kind::directional, {0, 0, -1}, glm::vec3(4), true}};
+    const Camera camera = analyticCamera(AnalyticScene::object, 0.5, 4);
+    const auto brightest = [](const Frame& frame) {
+        float most = 0;
+        for (const auto& p : frame.colour.pixels()) most = std::max({most, p.r, p.g, p.b});
+        return most;
+    };
+    const auto stopped = draw(bundle, s, camera);
+    ASSERT_TRUE(stopped) << stopped.error().text();
+    EXPECT_LE(brightest(*stopped), 1.0f);
+    s.lighting.beyondOne = true;
+    const auto frame = draw(bundle, s, camera);
+    ASSERT_TRUE(frame) << frame.error().text();
+    EXPECT_GT(brightest(*frame), 1.2f);
+    EXPECT_GT(psnr(frame->colour, drawOnCpu(bundle, s, camera).colour), 45.0);
+}
+
 TEST_P(GpuRenderers, AreLitByAnEnvironmentAsOnTheCpu) {
     const Bundle bundle = analyticBundle(AnalyticScene::object, 4, 2);
     const auto map = EnvironmentMap::make(paintedCube(32), Limits());

@@ -1,5 +1,7 @@
 #include "lib/render/splat/gpu/splat_frame.hpp"
 
+#include <limits>
+
 #include "lib/base/parallel.hpp"
 #include "lib/render/splat/gpu/splat_shaders.hpp"
 #include "lib/render/splat/others.hpp"
@@ -35,7 +37,8 @@ FrameUniforms uniformsOf(const GpuScene& scene, const RenderSettings& settings, 
     u.novelLens = {1.0 / novel.fx, 1.0 / novel.fy, novel.cx, novel.cy};
     const glm::mat3 axes = glm::mat3_cast(glm::quat(novel.orientation));
     u.novelAxisX = glm::vec4(axes[0], novel.orthographic ? 1.0f : 0.0f);
-    u.novelAxisY = glm::vec4(axes[1], 0.0f);
+    constexpr float kMost = std::numeric_limits<float>::max();
+    u.novelAxisY = glm::vec4(axes[1], settings.lighting.beyondOne ? kMost : 1.0f);
     u.novelAxisZ = glm::vec4(axes[2], 0.0f);
     const double coefficient = settings.splat == SplatRule::paper
                                    ? paperCoefficient(scene.rectangles, settings, novel)
