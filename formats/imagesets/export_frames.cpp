@@ -37,6 +37,9 @@ class FrameExporter {
                 return tl::unexpected(done.error().at(
                     fmt::format("frame {} ({:g} s)", i, frames_.timeline().times[i])));
         }
+        // Camera by camera: one whose first picture is late keeps its place among them.
+        for (WrittenView& track : tracks_)
+            for (OutputJson& frame : track.frames) json_["frames"].push_back(std::move(frame));
         STX_TRY(const std::string text, setText(json_));
         STX_CHECK(writeFile(root_ / "transforms.json",
                             std::as_bytes(std::span(text.data(), text.size()))));
@@ -45,10 +48,10 @@ class FrameExporter {
     }
 
   private:
-    /// What the files of a view were last.
     struct WrittenView {
         std::string name;  ///< of its newest files
         PicturesKey pictures;
+        std::vector<OutputJson> frames;
     };
 
     Result<void> add(std::size_t index) {
@@ -81,8 +84,8 @@ class FrameExporter {
             return {};
         };
         STX_CHECK(forEachView(*table, peak::kExport, job, write));
-        for (OutputJson& frame : shown)
-            if (!frame.empty()) json_["frames"].push_back(std::move(frame));
+        for (std::size_t k = 0; k < shown.size(); ++k)
+            if (!shown[k].empty()) tracks_[k].frames.push_back(std::move(shown[k]));
         return {};
     }
 

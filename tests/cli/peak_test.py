@@ -527,7 +527,7 @@ def pruned_one_by_one(args, folder):
 
 
 def main():
-    args = harness.arguments(__doc__, measure=0, pixels=14, views=1, only="")
+    args = harness.arguments(__doc__, measure=0, pixels=9, views=1, only="")
     wrong = []
     side = int((args.pixels * 1e6 / args.views) ** 0.5) // 64 * 64
     mega = side * side * args.views / 1e6

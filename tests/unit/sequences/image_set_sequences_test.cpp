@@ -112,6 +112,19 @@ TEST(MovingSets, ACameraThatStartsLaterIsNotThereBefore) {
     }
 }
 
+TEST(MovingSets, ACameraThatStartsLaterKeepsItsPlace) {
+    TemporaryFolder folder;
+    const auto first = opened(writeShots(folder, {{"b", 1, 1, 3}, {"a", 0, 0, 1}, {"a", 1, 0, 2}}));
+    ASSERT_TRUE(first);
+    Job job;
+    ASSERT_TRUE(exportFrames(*first, folder / "out", {}, job));
+    const auto again = opened(folder / "out" / "transforms.json");
+    ASSERT_TRUE(again);
+    for (std::size_t view = 0; view < 2; ++view)
+        EXPECT_EQ(again->frame(0, job)->views[view].name, first->frame(0, job)->views[view].name);
+    EXPECT_EQ(again->frame(0, job)->views[0].name, "b");
+}
+
 namespace {
 
 std::string notesOf(Job& job) {
