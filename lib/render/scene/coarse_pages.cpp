@@ -50,12 +50,17 @@ bool showsFinely(const PageSet& set, std::size_t view, glm::dvec3 point, glm::dv
     if (!(inCamera.z < 0) || !(glm::dot(sightOf(camera, point), sight) > 0)) return false;
     const glm::dvec3 pixel = camera.project(inCamera);
     const int u = static_cast<int>(std::floor(pixel.x)), v = static_cast<int>(std::floor(pixel.y));
-    if (!(u > 0 && v > 0 && u < camera.width - 1 && v < camera.height - 1)) return false;
-    const PageRectangle* r = set.find(view, u, v);
-    if (!r || set.pages()[r->page].texture->alpha(r->texel(u, v)) < 1.0f) return false;
-    const double found = set.depth(view, u, v);
-    const double own = stepAt(set, view, u, v);
-    return std::abs(found - pixel.z) <= kShownDepth * pixel.z + own && own <= step;
+    if (!(u >= 0 && v >= 0 && u < camera.width && v < camera.height)) return false;
+    // The pixel itself, or one beside it: at an outline it is covered in part, or beyond it.
+    for (int k = 0; k < 9; ++k) {
+        const int x = u + (k + 4) % 9 % 3 - 1, y = v + (k + 4) % 9 / 3 - 1;
+        if (!(x > 0 && y > 0 && x < camera.width - 1 && y < camera.height - 1)) continue;
+        const PageRectangle* r = set.find(view, x, y);
+        if (!r || set.pages()[r->page].texture->alpha(r->texel(x, y)) < 1.0f) continue;
+        const double found = set.depth(view, x, y), own = stepAt(set, view, x, y);
+        if (std::abs(found - pixel.z) <= kShownDepth * pixel.z + own && own <= step) return true;
+    }
+    return false;
 }
 
 }  // namespace
