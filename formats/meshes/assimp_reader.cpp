@@ -2,6 +2,7 @@
 #include <new>
 
 #include "formats/meshes/alpha_map.hpp"
+#include "formats/meshes/collada_text.hpp"
 #include "formats/meshes/foreign_scene.hpp"
 #include "formats/meshes/mesh_builder.hpp"
 #include "formats/meshes/mtl_notes.hpp"
@@ -385,6 +386,9 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         std::optional<Bytes> zeros;
         if (format == AssimpFormat::obj) zeros = withLeadingZeros(bytes);
         if (zeros) bytes = *zeros;
+        std::optional<std::string> matrices;
+        if (format == AssimpFormat::dae) STX_SET(matrices, withMatrices(bytes));
+        if (matrices) bytes = std::as_bytes(std::span(*matrices));
         std::optional<PlainText> plain;
         if (format == AssimpFormat::obj) plain = plainCoordinates(bytes, "v");
         if (format == AssimpFormat::stl) plain = plainCoordinates(bytes, "vertex");

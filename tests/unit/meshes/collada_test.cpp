@@ -1,0 +1,68 @@
+#include <array>
+#include <cmath>
+
+#include "tests/unit/meshes/models.hpp"
+
+namespace stx {
+namespace {
+
+/// A triangle (0, 0, 0), (1, 0, 0), (0, 1, 0) of COLLADA in nodes as given; `%` in them is its
+/// instance.
+std::string colladaOf(std::string nodes) {
+    nodes.replace(nodes.find('%'), 1, R"(<instance_geometry url="#g"/>)");
+    return R"(<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset/>
+<library_geometries><geometry id="g"><mesh><source id="p">
+<float_array id="a" count="9">0 0 0 1 0 0 0 1 0</float_array><technique_common>
+<accessor source="#a" count="3" stride="3"><param name="X" type="float"/>
+<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices><triangles count="1">
+<input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles></mesh></geometry>
+</library_geometries><library_visual_scenes><visual_scene id="s">)" +
+           nodes + R"(</visual_scene></library_visual_scenes><scene>
+<instance_visual_scene url="#s"/></scene></COLLADA>)";
+}
+
+/// Where the triangle's corners are with this in its node.
+std::vector<glm::dvec3> cornersWith(const std::string& transform) {
+    const auto model = readGoodText(colladaOf("<node>" + transform + "%</node>"), "a.dae");
+    if (model.mesh.positions.size() != 3) {
+        ADD_FAILURE() << model.mesh.positions.size() << " positions";
+        return std::vector<glm::dvec3>(3);
+    }
+    return {model.mesh.positions.begin(), model.mesh.positions.end()};
+}
+
+void expectCorners(const std::string& transform, const std::array<glm::dvec3, 3>& expected) {
+    const auto corners = cornersWith(transform);
+    for (int k = 0; k < 3; ++k)
+        EXPECT_LT(glm::distance(corners[k], expected[k]), 1e-6) << transform << ": corner " << k;
+}
+
+TEST(Collada, LookatIsRigid) {
+    // From (1, 2, 3) along -x: right is -z, up is y. The up leans by 45 degrees.
+    const std::array<glm::dvec3, 3> expected = {glm::dvec3(1, 2, 3), {1, 2, 2}, {1, 3, 3}};
+    expectCorners("<lookat>1 2 3 0 2 3 0 1 0</lookat>", expected);
+    expectCorners("<lookat>1 2 3 0 2 3 1 1 0</lookat>", expected);
+    expectCorners("<!-- <lookat> --><lookat sid=\"l\">\n 1 2 +3\t-4 2 3e0\r\n -7 7 0 </lookat>",
+                  expected);
+    expectCorners("<translate>1 2 2</translate><lookat>0 0 1 0 0 0 0 5 3</lookat>",
+                  {glm::dvec3(1, 2, 3), {2, 2, 3}, {1, 3, 3}});
+}
+
+TEST(Collada, SkewMovesAlongItsSecondAxis) {
+    const glm::dvec3 origin(0), x(1, 0, 0);
+    const double third = std::sqrt(1.0 / 3.0);
+    expectCorners("<skew>30 0 1 0 1 0 0</skew>", {origin, x, glm::dvec3(third, 1, 0)});
+    expectCorners("<skew>-45 0 2 0 0 0 3</skew>", {origin, x, glm::dvec3(0, 1, -1)});
+    // 45 degrees from x become 30.
+    expectCorners("<skew>15 1 1 0 1 0 0</skew>", {origin, x, glm::dvec3(std::sqrt(3.0) - 1, 1, 0)});
+    const auto error = readBadText(colladaOf("<node><skew>90 0 1 0 1 0 0</skew>%</node>"), "a.dae");
+    EXPECT_EQ(error.text(),
+              "'a.dae': skew '90 0 1 0 1 0 0' has no meaning: its first axis cannot turn by the "
+              "angle towards the second; expected two axes with an angle between them that is "
+              "larger");
+}
+
+}  // namespace
+}  // namespace stx
