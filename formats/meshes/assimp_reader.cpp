@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <new>
+#include <set>
 
 #include "formats/meshes/alpha_map.hpp"
 #include "formats/meshes/collada_text.hpp"
@@ -140,9 +141,21 @@ class SceneConverter {
             if (has)
                 files_.job().note(fmt::format("material '{}': its {} is dropped", m.name, label));
         }
+        noteUvSets(source);
         builder_.materials().push_back(std::move(m));
         mtlOf_.push_back(mtl);
         return {};
+    }
+
+    void noteUvSets(const ForeignScene::Material& source) {
+        std::set<std::uint32_t> sets;
+        for (const auto& texture : source.textures)
+            if (texture) sets.insert(texture->uvSet);
+        if (sets.size() > 1)
+            files_.job().note(fmt::format(
+                "material '{}': its maps have several sets of texture coordinates; all are drawn "
+                "with that of the first",
+                source.name));
     }
 
     /// Materials that a `usemtl` names and no material file has.
@@ -386,9 +399,11 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         std::optional<Bytes> zeros;
         if (format == AssimpFormat::obj) zeros = withLeadingZeros(bytes);
         if (zeros) bytes = *zeros;
-        std::optional<std::string> matrices;
-        if (format == AssimpFormat::dae) STX_SET(matrices, withMatrices(bytes));
-        if (matrices) bytes = std::as_bytes(std::span(*matrices));
+        PlainCollada collada;
+        if (format == AssimpFormat::dae) {
+            STX_SET(collada, plainCollada(bytes));
+            bytes = std::as_bytes(std::span(collada.text));
+        }
         std::optional<PlainText> plain;
         if (format == AssimpFormat::obj) plain = plainCoordinates(bytes, "v");
         if (format == AssimpFormat::stl) plain = plainCoordinates(bytes, "vertex");
@@ -410,6 +425,14 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         if (!side.missing().empty() && side.texts().empty())
             files.job().note(
                 fmt::format("material file {}; its materials have no colour", side.missing()));
+        if (!collada.wrap.empty())
+            files.job().note(fmt::format(
+                "wrap_s and wrap_t of samplers are not read ('{}' is the first): textures repeat",
+                collada.wrap));
+        if (!collada.boundTwice.empty())
+            files.job().note(fmt::format(
+                "'{}' is bound to several sets of texture coordinates; all textures have the first",
+                collada.boundTwice));
         return SceneConverter(scene, format, files, side, plain ? plain->origin : glm::dvec3(0.0))
             .convert();
     } catch (const std::bad_alloc&) {

@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <set>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -65,40 +67,109 @@ Result<std::optional<glm::dmat4>> skew(std::string_view values) {
     return glm::dmat4(glm::dmat3(1.0) + glm::outerProduct(along, aside / sine) * shift);
 }
 
-}  // namespace
-
-Result<std::optional<std::string>> withMatrices(ByteSpan bytes) {
-    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    std::string out;
-    std::size_t copied = 0;
+/// Calls visit(at) for each element's start and end; comments are passed over. Errors: of visit.
+template <class Visit>
+Result<void> eachTag(std::string_view text, const Visit& visit) {
     for (auto at = text.find('<'); at != std::string_view::npos; at = text.find('<', at + 1)) {
-        const auto rest = text.substr(at);
-        if (rest.starts_with("<!--")) {
+        if (text.substr(at).starts_with("<!--")) {
             at = text.find("-->", at);
             if (at == std::string_view::npos) break;
-            continue;
+        } else {
+            STX_CHECK(visit(at));
         }
-        const auto values = [&](std::string_view start, std::string_view end) {
-            const auto open = rest.find('>'), close = rest.find('<', 1);
-            const bool whole = rest.starts_with(start) && open < close &&
-                               close != std::string_view::npos &&
-                               rest.substr(close).starts_with(end);
-            return whole ? rest.substr(open + 1, close - open - 1) : std::string_view();
-        };
-        std::optional<glm::dmat4> parentFromHere = lookat(values("<lookat", "</lookat>"));
-        const auto skewed = values("<skew", "</skew>");
+    }
+    return {};
+}
+
+/// What is between the tags, where `text` begins with an element of this name and nothing else is
+/// in it; else empty.
+std::string_view contentOf(std::string_view text, std::string_view name) {
+    const auto named = [&](std::string_view tag) {
+        return tag.starts_with(name) && tag.find_first_of("> \t\r\n", name.size()) == name.size();
+    };
+    if (!named(text.substr(1))) return {};
+    const auto close = text.find('<', 1);
+    if (close == std::string_view::npos) return {};
+    const auto open = text.substr(0, close).find('>');
+    const auto end = text.substr(close);
+    if (open == std::string_view::npos || !end.starts_with("</") || !named(end.substr(2)))
+        return {};
+    return text.substr(open + 1, close - open - 1);
+}
+
+/// The value of an attribute in the tag that `text` begins with; empty without one.
+std::string_view attributeOf(std::string_view text, std::string_view name) {
+    const auto tag = text.substr(0, text.find_first_of("<>", 1));
+    for (auto at = tag.find(name); at != std::string_view::npos; at = tag.find(name, at + 1)) {
+        const auto value = trimmed(tag.substr(at + name.size()));
+        if (trimmed(tag.substr(at - 1, 1)).empty() && value.starts_with('=')) {
+            const auto quoted = trimmed(value.substr(1));
+            if (quoted.empty()) return {};
+            return quoted.substr(1, quoted.find(quoted[0], 1) - 1);
+        }
+    }
+    return {};
+}
+
+std::uint32_t numberIn(std::string_view digits) {
+    std::uint32_t number = 0;
+    std::from_chars(digits.data(), digits.data() + digits.size(), number);
+    return number;
+}
+
+}  // namespace
+
+Result<PlainCollada> plainCollada(ByteSpan bytes) {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    PlainCollada out;
+    std::set<std::uint32_t> sets;
+    std::map<std::string_view, std::uint32_t> setOf;  // of what bind_vertex_input names
+    STX_CHECK(eachTag(text, [&](std::size_t at) -> Result<void> {
+        const auto tag = text.substr(at);
+        if (tag.starts_with("<input") && attributeOf(tag, "semantic") == "TEXCOORD")
+            sets.insert(numberIn(attributeOf(tag, "set")));
+        if (tag.starts_with("<bind_vertex_input")) {
+            const auto set = numberIn(attributeOf(tag, "input_set"));
+            const auto [bound, isNew] = setOf.emplace(attributeOf(tag, "semantic"), set);
+            if (!isNew && bound->second != set && out.boundTwice.empty())
+                out.boundTwice = bound->first;
+        }
+        for (const std::string_view name : {"wrap_s", "wrap_t"}) {
+            const auto wrap = trimmed(contentOf(tag, name));
+            if (out.wrap.empty() && !wrap.empty() && wrap != "WRAP") out.wrap = wrap;
+        }
+        return {};
+    }));
+    std::size_t copied = 0;
+    const auto replace = [&](std::size_t from, std::size_t to, std::string_view with) {
+        out.text += text.substr(copied, from - copied);
+        out.text += with;
+        copied = to;
+    };
+    STX_CHECK(eachTag(text, [&](std::size_t at) -> Result<void> {
+        const auto tag = text.substr(at);
+        if (tag.starts_with("<texture")) {
+            const auto name = attributeOf(tag, "texcoord");
+            if (name.empty()) return {};
+            const auto bound = setOf.find(name);
+            const auto set = bound == setOf.end() ? sets.end() : sets.find(bound->second);
+            const auto number = set == sets.end() ? 0 : std::distance(sets.begin(), set);
+            const auto from = static_cast<std::size_t>(name.data() - text.data());
+            replace(from, from + name.size(), fmt::format("{}", number));
+            return {};
+        }
+        std::optional<glm::dmat4> parentFromHere = lookat(contentOf(tag, "lookat"));
+        const auto skewed = contentOf(tag, "skew");
         if (!skewed.empty()) STX_SET(parentFromHere, skew(skewed));
-        if (!parentFromHere) continue;
-        out += text.substr(copied, at - copied);
-        out += "<matrix>";
+        if (!parentFromHere) return {};
+        std::string matrix = "<matrix>";
         for (int row = 0; row < 4; ++row)
             for (int column = 0; column < 4; ++column)
-                out += fmt::format("{} ", (*parentFromHere)[column][row]);
-        out += "</matrix>";
-        copied = text.find('>', text.find('<', at + 1)) + 1;
-    }
-    if (copied == 0) return std::nullopt;
-    out += text.substr(copied);
+                matrix += fmt::format("{} ", (*parentFromHere)[column][row]);
+        replace(at, text.find('>', text.find('<', at + 1)) + 1, matrix + "</matrix>");
+        return {};
+    }));
+    out.text += text.substr(copied);
     return out;
 }
 

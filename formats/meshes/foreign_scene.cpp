@@ -29,6 +29,7 @@ ForeignScene::Material materialIn(Unpacker& in) {
         to.name = in.getText();
         to.wrapU = in.get<std::uint8_t>();
         to.wrapV = in.get<std::uint8_t>();
+        to.uvSet = in.get<std::uint32_t>();
         to.embedded = in.get<std::int32_t>();
     }
     material.hasBump = in.get<std::uint8_t>() != 0;

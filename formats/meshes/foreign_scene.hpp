@@ -16,6 +16,7 @@ namespace stx {
 struct ForeignTexture {
     std::string name;
     std::uint8_t wrapU = 0, wrapV = 0;  ///< values of MeshTexture::Wrap
+    std::uint32_t uvSet = 0;            ///< number of the texture coordinates that it is drawn with
     std::int32_t embedded = -1;         ///< its number among ForeignScene::embedded, when inside
 };
 
@@ -47,7 +48,7 @@ struct ForeignScene {
         std::vector<glm::vec3> positions;
         std::vector<glm::vec3> normals;  ///< as many, or none; so are the next two
         std::vector<glm::vec4> colours;
-        std::vector<glm::vec2> uvs;
+        std::vector<glm::vec2> uvs;               ///< of the set of its material's first texture
         std::vector<std::uint32_t> cornerCounts;  ///< of each face; empty: all are triangles
         std::vector<std::uint32_t> corners;       ///< numbers of positions, face after face
     };

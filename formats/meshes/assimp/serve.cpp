@@ -173,6 +173,7 @@ class SceneTeller {
         mode = aiTextureMapMode_Wrap;
         from.Get(AI_MATKEY_MAPPINGMODE_V(type, 0), mode);
         out_.put(wrap(mode));
+        out_.put(static_cast<std::uint32_t>(uvSetOf(from, type)));
         std::int32_t number = -1;
         if (const aiTexture* inside = scene_.GetEmbeddedTexture(name.C_Str())) {
             const auto [at, added] =
@@ -181,6 +182,25 @@ class SceneTeller {
             number = at->second;
         }
         out_.put(number);
+    }
+
+    static int uvSetOf(const aiMaterial& material, aiTextureType type) {
+        int set = 0;
+        material.Get(AI_MATKEY_UVWSRC(type, 0), set);
+        return set;
+    }
+
+    /// The texture coordinates of the first texture of a mesh's material. Assimp leaves out sets
+    /// that a mesh does not have, so a number behind the last is that one.
+    [[nodiscard]] const aiVector3D* uvsOf(const aiMesh& mesh) const {
+        const auto arrays = static_cast<int>(mesh.GetNumUVChannels());
+        if (arrays == 0 || mesh.mMaterialIndex >= scene_.mNumMaterials)
+            return mesh.mTextureCoords[0];
+        const aiMaterial& material = *scene_.mMaterials[mesh.mMaterialIndex];
+        const auto* type = std::ranges::find_if(
+            kTypes, [&](aiTextureType each) { return material.GetTextureCount(each) > 0; });
+        const int set = type == std::end(kTypes) ? 0 : uvSetOf(material, *type);
+        return mesh.mTextureCoords[std::clamp(set, 0, arrays - 1)];
     }
 
     void putNode(const aiNode& node, std::int32_t parent, Packer& to) {
@@ -193,14 +213,15 @@ class SceneTeller {
         for (unsigned i = 0; i < node.mNumChildren; ++i) putNode(*node.mChildren[i], self, to);
     }
 
-    static bool sendMesh(const aiMesh& mesh) {
+    [[nodiscard]] bool sendMesh(const aiMesh& mesh) const {
+        const aiVector3D* given = uvsOf(mesh);
         MeshHead head;
         head.positions = mesh.mNumVertices;
         head.faces = mesh.mNumFaces;
         head.material = mesh.mMaterialIndex;
         head.normals = mesh.mNormals != nullptr;
         head.colours = mesh.mColors[0] != nullptr;
-        head.uvs = mesh.mTextureCoords[0] != nullptr;
+        head.uvs = given != nullptr;
         const std::span faces(mesh.mFaces, mesh.mNumFaces);
         head.triangles =
             std::ranges::all_of(faces, [](const auto& f) { return f.mNumIndices == 3; });
@@ -214,8 +235,7 @@ class SceneTeller {
         std::vector<glm::vec2> uvs;
         if (head.uvs) {
             uvs.reserve(head.positions);
-            for (const auto& uv : std::span(mesh.mTextureCoords[0], head.positions))
-                uvs.emplace_back(uv.x, uv.y);
+            for (const auto& uv : std::span(given, head.positions)) uvs.emplace_back(uv.x, uv.y);
         }
         const std::string_view name = mesh.mName.C_Str();
         const std::uint64_t length = name.size();

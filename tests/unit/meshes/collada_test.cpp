@@ -64,5 +64,75 @@ TEST(Collada, SkewMovesAlongItsSecondAxis) {
               "larger");
 }
 
+/// A textured triangle with two sets of texture coordinates, (0.25, 0.5) and (0.75, 0.5) all over.
+std::string colladaWithSets(int first, int second, const std::string& bind,
+                            const std::string& sampler = "", const std::string& name = "UVMap") {
+    const auto replaced = [](std::string text, const std::string& what, const std::string& with) {
+        return text.replace(text.find(what), what.size(), with);
+    };
+    const auto source = [](const std::string& id, const std::string& u) {
+        return fmt::format(
+            R"(<source id="{0}"><float_array id="{0}a" count="2">{1} 0.5</float_array>
+<technique_common><accessor source="#{0}a" count="1" stride="2"><param name="S" type="float"/>
+<param name="T" type="float"/></accessor></technique_common></source>)",
+            id, u);
+    };
+    const std::string effect = R"(<library_images><image id="i"><init_from>t.png</init_from></image>
+</library_images><library_effects><effect id="e"><profile_COMMON><newparam sid="f">
+<surface type="2D"><init_from>i</init_from></surface></newparam><newparam sid="s"><sampler2D>
+<source>f</source>)" + sampler +
+                               R"(</sampler2D></newparam><technique sid="c"><lambert><diffuse>
+<texture texture="s" texcoord=")" +
+                               name +
+                               R"("/></diffuse></lambert></technique></profile_COMMON></effect>
+</library_effects><library_materials><material id="m"><instance_effect url="#e"/></material>
+</library_materials><library_geometries>)";
+    auto text = colladaOf("<node>%</node>");
+    text = replaced(text, R"(<instance_geometry url="#g"/>)",
+                    R"(<instance_geometry url="#g"><bind_material><technique_common>
+<instance_material symbol="mm" target="#m">)" +
+                        bind + R"(</instance_material></technique_common></bind_material>
+</instance_geometry>)");
+    text = replaced(text, "<library_geometries>", effect);
+    text = replaced(text, "<vertices", source("u0", "0.25") + source("u1", "0.75") + "<vertices");
+    text = replaced(text, R"(<triangles)", R"(<triangles material="mm")");
+    return replaced(text, "<p>0 1 2</p>",
+                    fmt::format(R"(<input semantic="TEXCOORD" source="#u0" offset="1" set="{}"/>
+<input semantic="TEXCOORD" source="#u1" offset="1" set="{}"/><p>0 0 1 0 2 0</p>)",
+                                first, second));
+}
+
+TEST(Collada, TexturesHaveTheSetOfCoordinatesThatIsBound) {
+    const auto u = [](int first, int second, int bound) {
+        const auto bind = fmt::format(
+            R"(<bind_vertex_input semantic="UVMap" input_semantic="TEXCOORD" input_set="{}"/>)",
+            bound);
+        const auto model = readGoodText(colladaWithSets(first, second, bind), "a.dae");
+        if (model.mesh.uvs.empty()) return -1.0f;
+        return model.mesh.uvs[0].x;
+    };
+    EXPECT_EQ(u(0, 1, 0), 0.25f);
+    EXPECT_EQ(u(0, 1, 1), 0.75f);
+    EXPECT_EQ(u(1, 2, 1), 0.25f) << "3ds Max counts from 1";
+    EXPECT_EQ(u(1, 2, 2), 0.75f);
+    EXPECT_EQ(u(0, 3, 3), 0.75f);
+    EXPECT_EQ(u(1, 0, 0), 0.75f);
+    EXPECT_EQ(u(0, 1, 7), 0.25f) << "no such set";
+    for (const char* name : {"UVMap", "CHANNEL1"})
+        EXPECT_EQ(readGoodText(colladaWithSets(0, 1, "", "", name), "a.dae").mesh.uvs.at(0).x,
+                  0.25f);
+}
+
+TEST(Collada, WrapThatIsNotReadIsSaid) {
+    const std::string note = "wrap_s and wrap_t of samplers are not read";
+    const auto with = [](const std::string& sampler) {
+        return readGoodText(colladaWithSets(0, 1, "", sampler), "a.dae");
+    };
+    EXPECT_FALSE(with("<wrap_s>WRAP</wrap_s><wrap_t> WRAP </wrap_t>").hasNote(note));
+    EXPECT_TRUE(with("<wrap_s>WRAP</wrap_s><wrap_t>CLAMP</wrap_t>")
+                    .hasNote(note + " ('CLAMP' is the first): textures repeat"));
+    EXPECT_TRUE(with("<wrap_s> MIRROR</wrap_s>").hasNote("'MIRROR'"));
+}
+
 }  // namespace
 }  // namespace stx
