@@ -68,14 +68,13 @@ class SceneConverter {
             builder_.materials().push_back({.name = "default", .hasColour = false});
             mtlOf_.emplace_back();
         }
-        std::vector<glm::dmat4> worldFromNode;
-        for (const auto& node : scene_.nodes) {
-            worldFromNode.push_back(node.parent < 0 ? glm::dmat4(node.parentFromNode)
-                                                    : worldFromNode[node.parent] *
-                                                          glm::dmat4(node.parentFromNode));
-            for (const std::uint32_t mesh : node.meshes)
-                STX_CHECK(convertMesh(scene_.meshes[mesh], worldFromNode.back()));
-        }
+        for (const auto& node : scene_.nodes)
+            worldFromNode_.push_back(node.parent < 0 ? glm::dmat4(node.parentFromNode)
+                                                     : worldFromNode_[node.parent] *
+                                                           glm::dmat4(node.parentFromNode));
+        for (std::size_t i = 0; i < scene_.nodes.size(); ++i)
+            for (const std::uint32_t mesh : scene_.nodes[i].meshes)
+                STX_CHECK(convertMesh(scene_.meshes[mesh], worldFromNode_[i]));
         if (scene_.animations > 0)
             files_.job().note(fmt::format("dropped: animations ({})", scene_.animations));
         if (lines_ > 0) files_.job().note(fmt::format("dropped: lines ({})", lines_));
@@ -236,21 +235,63 @@ class SceneConverter {
         return files_.textureFromBytes(inside.bytes, name, state, builder_.textures());
     }
 
-    /// Positions, normals, colours and texture coordinates.
-    void addVertices(const ForeignScene::Mesh& mesh, const glm::dmat4& worldFromMesh,
-                     MeshPart& part) const {
-        const bool moved = worldFromMesh != glm::dmat4(1.0);
-        for (const glm::dvec3 p : mesh.positions)
-            part.positions.push_back(moved ? glm::dvec3(worldFromMesh * glm::dvec4(p, 1.0)) : p);
+    /// Where a skin brings each vertex: the mean of its bones by weight. A vertex without any
+    /// follows the mesh's node.
+    Result<std::vector<glm::dmat4>> poses(const ForeignScene::Mesh& mesh,
+                                          const glm::dmat4& worldFromMesh,
+                                          const std::string& where) {
+        const auto count = mesh.positions.size();
+        STX_CHECK(builder_.charge(count, sizeof(glm::dmat4) + sizeof(double), where));
+        std::vector<glm::dmat4> worldFromVertex(count, glm::dmat4(0.0));
+        std::vector<double> sums(count, 0.0);
+        const models::BoneWeight* weight = mesh.weights.data();
+        for (const auto& bone : mesh.bones) {
+            const auto worldFromBone = worldFromNode_[bone.node] * glm::dmat4(bone.nodeFromMesh);
+            for (std::uint32_t k = 0; k < bone.weights; ++k, ++weight) {
+                worldFromVertex[weight->vertex] += worldFromBone * double{weight->weight};
+                sums[weight->vertex] += weight->weight;
+            }
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            if (sums[i] == 0)
+                worldFromVertex[i] = worldFromMesh;
+            else
+                worldFromVertex[i] /= sums[i];
+        }
+        return worldFromVertex;
+    }
+
+    /// Positions, normals, colours and texture coordinates; triangles face the other way where
+    /// most vertices are mirrored.
+    Result<void> addVertices(const ForeignScene::Mesh& mesh, const glm::dmat4& worldFromMesh,
+                             MeshPart& part, bool& mirrored) {
+        std::vector<glm::dmat4> posed;
+        if (!mesh.bones.empty()) STX_SET(posed, poses(mesh, worldFromMesh, part.where));
+        const bool moved = !posed.empty() || worldFromMesh != glm::dmat4(1.0);
+        const auto worldFrom = [&](std::size_t i) -> const glm::dmat4& {
+            return posed.empty() ? worldFromMesh : posed[i];
+        };
+        for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+            const glm::dvec3 p = mesh.positions[i];
+            part.positions.push_back(moved ? glm::dvec3(worldFrom(i) * glm::dvec4(p, 1.0)) : p);
+        }
+        const auto isMirrored = [](const glm::dmat4& m) {
+            return glm::determinant(glm::dmat3(m)) < 0;
+        };
+        mirrored = posed.empty() ? isMirrored(worldFromMesh)
+                                 : std::ranges::count_if(posed, isMirrored) >
+                                       static_cast<std::ptrdiff_t>(posed.size() / 2);
         // A facet's normal in STL is often wrong or zero, and says no more than its corners.
         if (!mesh.normals.empty() && format_ != AssimpFormat::stl) {
-            // Cofactors: the inverse transpose but for a factor.
-            const glm::dmat3 m(worldFromMesh);
-            const glm::dmat3 forNormals(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]),
-                                        glm::cross(m[0], m[1]));
-            const double side = glm::determinant(m) < 0 ? -1.0 : 1.0;
-            for (const auto& n : mesh.normals)
+            for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
+                // Cofactors: the inverse transpose but for a factor.
+                const glm::dmat3 m(worldFrom(i));
+                const glm::dmat3 forNormals(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]),
+                                            glm::cross(m[0], m[1]));
+                const double side = glm::determinant(m) < 0 ? -1.0 : 1.0;
+                const auto& n = mesh.normals[i];
                 part.normals.push_back(moved ? glm::vec3(forNormals * glm::dvec3(n) * side) : n);
+            }
         }
         if (!mesh.colours.empty()) {
             part.colours = mesh.colours;
@@ -264,6 +305,7 @@ class SceneConverter {
                 part.uvs.emplace_back(uv.x, 1.0f - uv.y);
             }
         }
+        return {};
     }
 
     /// Faces cut into triangles; counts lines and, where there are triangles, points.
@@ -320,9 +362,10 @@ class SceneConverter {
         part.where = mesh.name.empty() ? "the mesh" : fmt::format("mesh '{}'", mesh.name);
         STX_CHECK(builder_.charge(mesh.positions.size(), 80, part.where));
         part.material = mesh.material < builder_.materials().size() ? mesh.material : 0;
-        addVertices(mesh, worldFromMesh, part);
+        bool mirrored = false;
+        STX_CHECK(addVertices(mesh, worldFromMesh, part, mirrored));
         addFaces(mesh, part);
-        if (glm::determinant(glm::dmat3(worldFromMesh)) < 0)
+        if (mirrored)
             for (auto& t : part.triangles) std::swap(t.y, t.z);
         if (part.triangles.empty() && !part.points) return {};
         dropTexturesWithoutUvs(part);
@@ -336,6 +379,7 @@ class SceneConverter {
     MeshBuilder builder_;
     std::map<std::string, MtlMaterial> mtl_;
     std::vector<MtlMaterial> mtlOf_;  ///< of each material
+    std::vector<glm::dmat4> worldFromNode_;
     std::string materialFolder_;
     std::size_t lines_ = 0, points_ = 0;
     bool saysUndefined_ = false;  ///< nothing has been said of materials without a file

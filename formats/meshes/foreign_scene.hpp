@@ -21,7 +21,7 @@ struct ForeignTexture {
 };
 
 /// A model as the library that reads it has it, before it is a Mesh: what its process tells
-/// (Tag::scene, then Tag::mesh for each mesh). Numbers of meshes and corners are checked.
+/// (Tag::scene, then Tag::mesh for each mesh). Numbers of meshes, nodes and vertices are checked.
 struct ForeignScene {
     using Texture = ForeignTexture;
     using Use = models::TextureUse;
@@ -51,6 +51,8 @@ struct ForeignScene {
         std::vector<glm::vec2> uvs;               ///< of the set of its material's first texture
         std::vector<std::uint32_t> cornerCounts;  ///< of each face; empty: all are triangles
         std::vector<std::uint32_t> corners;       ///< numbers of positions, face after face
+        std::vector<models::Bone> bones;
+        std::vector<models::BoneWeight> weights;  ///< bone after bone
     };
 
     std::vector<Material> materials;

@@ -184,6 +184,11 @@ class SceneTeller {
         out_.put(number);
     }
 
+    static glm::mat4 toMatrix(const aiMatrix4x4& m) {
+        return glm::transpose(glm::mat4(m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2,
+                                        m.c3, m.c4, m.d1, m.d2, m.d3, m.d4));
+    }
+
     static int uvSetOf(const aiMaterial& material, aiTextureType type) {
         int set = 0;
         material.Get(AI_MATKEY_UVWSRC(type, 0), set);
@@ -205,10 +210,9 @@ class SceneTeller {
 
     void putNode(const aiNode& node, std::int32_t parent, Packer& to) {
         const std::int32_t self = nodes_++;
+        nodeOf_.emplace(node.mName.C_Str(), self);
         to.put(parent);
-        const auto& m = node.mTransformation;
-        to.put(glm::transpose(glm::mat4(m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2,
-                                        m.c3, m.c4, m.d1, m.d2, m.d3, m.d4)));
+        to.put(toMatrix(node.mTransformation));
         to.putBytes(std::as_bytes(std::span(node.mMeshes, node.mNumMeshes)));
         for (unsigned i = 0; i < node.mNumChildren; ++i) putNode(*node.mChildren[i], self, to);
     }
@@ -237,6 +241,21 @@ class SceneTeller {
             uvs.reserve(head.positions);
             for (const auto& uv : std::span(given, head.positions)) uvs.emplace_back(uv.x, uv.y);
         }
+        std::vector<Bone> bones;
+        std::vector<BoneWeight> weights;
+        for (const aiBone* bone : std::span(mesh.mBones, mesh.mNumBones)) {
+            const auto node = nodeOf_.find(bone->mName.C_Str());
+            if (node == nodeOf_.end()) continue;
+            const auto before = weights.size();
+            for (const auto& weight : std::span(bone->mWeights, bone->mNumWeights))
+                if (weight.mVertexId < mesh.mNumVertices)
+                    weights.push_back({weight.mVertexId, weight.mWeight});
+            bones.push_back({static_cast<std::uint32_t>(node->second),
+                             static_cast<std::uint32_t>(weights.size() - before),
+                             toMatrix(bone->mOffsetMatrix)});
+        }
+        head.bones = bones.size();
+        head.weights = weights.size();
         const std::string_view name = mesh.mName.C_Str();
         const std::uint64_t length = name.size();
         const auto send = [](const void* from, std::size_t size) {
@@ -253,12 +272,15 @@ class SceneTeller {
                (!head.colours || send(mesh.mColors[0], head.positions * sizeof(aiColor4D))) &&
                send(uvs.data(), uvs.size() * sizeof(uvs[0])) &&
                send(counts.data(), counts.size() * sizeof(counts[0])) &&
-               send(corners.data(), corners.size() * sizeof(corners[0]));
+               send(corners.data(), corners.size() * sizeof(corners[0])) &&
+               send(bones.data(), bones.size() * sizeof(bones[0])) &&
+               send(weights.data(), weights.size() * sizeof(weights[0]));
     }
 
     const aiScene& scene_;
     Packer out_;
     std::int32_t nodes_ = 0;
+    std::map<std::string, std::int32_t> nodeOf_;  ///< by name, the first of each
     std::vector<const aiTexture*> embedded_;
     std::map<const aiTexture*, std::int32_t> numbers_;
 };

@@ -134,5 +134,51 @@ TEST(Collada, WrapThatIsNotReadIsSaid) {
     EXPECT_TRUE(with("<wrap_s> MIRROR</wrap_s>").hasNote("'MIRROR'"));
 }
 
+TEST(Collada, SkinsAreInThePoseOfTheirBones) {
+    // The bind shape doubles. The bones were at (0, 0, 0) and (1, 0, 0) as the mesh was bound.
+    // Corner 0 follows the first bone, 1 the second, 2 both by halves.
+    const std::string controller = R"(<library_controllers><controller id="k"><skin source="#g">
+<bind_shape_matrix>2 0 0 0 0 2 0 0 0 0 2 0 0 0 0 1</bind_shape_matrix><source id="kj">
+<Name_array id="kja" count="2">A B</Name_array><technique_common><accessor source="#kja" count="2"
+stride="1"><param name="JOINT" type="name"/></accessor></technique_common></source><source id="kb">
+<float_array id="kba" count="32">1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1
+1 0 0 -1 0 1 0 0 0 0 1 0 0 0 0 1</float_array><technique_common><accessor source="#kba" count="2"
+stride="16"><param name="TRANSFORM" type="float4x4"/></accessor></technique_common></source>
+<source id="kw"><float_array id="kwa" count="2">1 0.5</float_array><technique_common>
+<accessor source="#kwa" count="2" stride="1"><param name="WEIGHT" type="float"/></accessor>
+</technique_common></source><joints><input semantic="JOINT" source="#kj"/>
+<input semantic="INV_BIND_MATRIX" source="#kb"/></joints><vertex_weights count="3">
+<input semantic="JOINT" source="#kj" offset="0"/><input semantic="WEIGHT" source="#kw" offset="1"/>
+<vcount>1 1 2</vcount><v>0 0 1 0 0 1 1 1</v></vertex_weights></skin></controller>
+</library_controllers><library_visual_scenes>)";
+    const auto read = [&](const std::string& bones) {
+        auto text = colladaOf(bones + "<node><translate>9 9 9</translate>%</node>");
+        const std::string instance = R"(<instance_geometry url="#g"/>)";
+        text.replace(text.find(instance), instance.size(), R"(<instance_controller url="#k">
+<skeleton>#A</skeleton></instance_controller>)");
+        const std::string scenes = "<library_visual_scenes>";
+        return readGoodText(text.replace(text.find(scenes), scenes.size(), controller), "a.dae");
+    };
+    const auto bones = [](const std::string& first, const std::string& second) {
+        return R"(<node id="A" sid="A" name="A" type="JOINT">)" + first +
+               R"(<node id="B" sid="B" name="B" type="JOINT">)" + second + "</node></node>";
+    };
+    // The first bone is at (0, 0, 5), the second above it, turned by 90 degrees about x.
+    const auto model = read(bones("<translate>0 0 5</translate>",
+                                  "<translate>0 0 1</translate><rotate>1 0 0 90</rotate>"));
+    ASSERT_EQ(model.mesh.positions.size(), 3u);
+    EXPECT_TRUE(model.notes.empty()) << model.notes[0];
+    const std::array<glm::dvec3, 3> expected = {glm::dvec3(0, 0, 5), {1, 0, 6}, {-0.5, 1, 6.5}};
+    for (int k = 0; k < 3; ++k)
+        EXPECT_LT(glm::distance(glm::dvec3(model.mesh.positions[k]), expected[k]), 1e-6) << k;
+    const auto facing = [](const ReadModel& of) {
+        const auto t = of.mesh.triangles.at(0);
+        const auto& p = of.mesh.positions;
+        return glm::cross(p[t.y] - p[t.x], p[t.z] - p[t.x]).z;
+    };
+    EXPECT_GT(facing(model), 0);
+    EXPECT_GT(facing(read(bones("<scale>-1 1 1</scale>", ""))), 0) << "mirrored";
+}
+
 }  // namespace
 }  // namespace stx
