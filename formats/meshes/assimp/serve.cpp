@@ -189,6 +189,25 @@ class SceneTeller {
                                         m.c3, m.c4, m.d1, m.d2, m.d3, m.d4));
     }
 
+    /// What turns the axes of FBX's GlobalSettings to ours: x to the right, y up, z to the front.
+    /// Axes that are no rotation are not believed.
+    [[nodiscard]] glm::mat4 worldFromFile() const {
+        const glm::mat4 none(1.0f);
+        if (!scene_.mMetaData) return none;
+        glm::mat3 rows(0.0f);
+        constexpr std::pair<const char*, const char*> kKeys[] = {{"CoordAxis", "CoordAxisSign"},
+                                                                 {"UpAxis", "UpAxisSign"},
+                                                                 {"FrontAxis", "FrontAxisSign"}};
+        for (int row = 0; row < 3; ++row) {
+            std::int32_t axis = 0, sign = 0;
+            if (!scene_.mMetaData->Get(kKeys[row].first, axis) ||
+                !scene_.mMetaData->Get(kKeys[row].second, sign) || axis < 0 || axis > 2)
+                return none;
+            rows[row][axis] = sign < 0 ? -1.0f : 1.0f;
+        }
+        return glm::determinant(rows) == 1.0f ? glm::mat4(glm::transpose(rows)) : none;
+    }
+
     static int uvSetOf(const aiMaterial& material, aiTextureType type) {
         int set = 0;
         material.Get(AI_MATKEY_UVWSRC(type, 0), set);
@@ -212,7 +231,10 @@ class SceneTeller {
         const std::int32_t self = nodes_++;
         nodeOf_.emplace(node.mName.C_Str(), self);
         to.put(parent);
-        to.put(toMatrix(node.mTransformation));
+        const glm::mat4 parentFromNode = toMatrix(node.mTransformation);
+        // Newer versions of Assimp turn the root themselves.
+        const bool turns = parent < 0 && parentFromNode == glm::mat4(1.0f);
+        to.put(turns ? worldFromFile() : parentFromNode);
         to.putBytes(std::as_bytes(std::span(node.mMeshes, node.mNumMeshes)));
         for (unsigned i = 0; i < node.mNumChildren; ++i) putNode(*node.mChildren[i], self, to);
     }

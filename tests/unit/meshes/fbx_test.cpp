@@ -88,5 +88,25 @@ TEST(Fbx, SkinsAreInThePoseOfTheirBones) {
     expectCornersAt(model, {glm::dvec3(0, 3, 2), {1, 0, 2}, {0, 4, 2}});
 }
 
+TEST(Fbx, TheUpAxisIsUp) {
+    const auto with = [](int up, int front, int frontSign, int right, int rightSign) {
+        const auto number = [](const char* name, int value) {
+            return fmt::format("\t\tP: \"{}\", \"int\", \"Integer\", \"\",{}\n", name, value);
+        };
+        return fbxOf(number("UpAxis", up) + number("UpAxisSign", 1) + number("FrontAxis", front) +
+                     number("FrontAxisSign", frontSign) + number("CoordAxis", right) +
+                     number("CoordAxisSign", rightSign));
+    };
+    const std::array<glm::dvec3, 3> asWritten = {glm::dvec3(0, 0, 2), {1, 0, 2}, {0, 1, 2}};
+    expectCornersAt(with(1, 2, 1, 0, 1), asWritten);
+    // As 3ds Max writes it; then the x axis up.
+    expectCornersAt(with(2, 1, -1, 0, 1), {glm::dvec3(0, 2, 0), {1, 2, 0}, {0, 2, -1}});
+    expectCornersAt(with(0, 2, 1, 1, -1), {glm::dvec3(0, 0, 2), {0, 1, 2}, {-1, 0, 2}});
+    // Axes that are no rotation are not believed.
+    expectCornersAt(with(2, 2, 1, 0, 1), asWritten);
+    expectCornersAt(with(1, 2, -1, 0, 1), asWritten);
+    expectCornersAt(with(1, 70, 1, -5, 1), asWritten);
+}
+
 }  // namespace
 }  // namespace stx
