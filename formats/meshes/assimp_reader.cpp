@@ -471,7 +471,7 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
                 fmt::format("material file {}; its materials have no colour", side.missing()));
         if (!collada.wrap.empty())
             files.job().note(fmt::format(
-                "wrap_s and wrap_t of samplers are not read ('{}' is the first): textures repeat",
+                "wrap '{}' of samplers is not read, only WRAP, CLAMP and MIRROR: textures repeat",
                 collada.wrap));
         if (!collada.boundTwice.empty())
             files.job().note(fmt::format(

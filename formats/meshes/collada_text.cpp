@@ -1,11 +1,11 @@
 #include "formats/meshes/collada_text.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -100,10 +100,13 @@ std::string_view contentOf(std::string_view text, std::string_view name) {
 /// The value of an attribute in the tag that `text` begins with; empty without one.
 std::string_view attributeOf(std::string_view text, std::string_view name) {
     const auto tag = text.substr(0, text.find_first_of("<>", 1));
+    const auto fromWord = [](std::string_view rest) {
+        return rest.substr(std::min(rest.find_first_not_of(" \t\r\n"), rest.size()));
+    };
     for (auto at = tag.find(name); at != std::string_view::npos; at = tag.find(name, at + 1)) {
-        const auto value = trimmed(tag.substr(at + name.size()));
+        const auto value = fromWord(tag.substr(at + name.size()));
         if (trimmed(tag.substr(at - 1, 1)).empty() && value.starts_with('=')) {
-            const auto quoted = trimmed(value.substr(1));
+            const auto quoted = fromWord(value.substr(1));
             if (quoted.empty()) return {};
             return quoted.substr(1, quoted.find(quoted[0], 1) - 1);
         }
@@ -117,17 +120,24 @@ std::uint32_t numberIn(std::string_view digits) {
     return number;
 }
 
+/// What Maya says in a texture of a sampler's wrap_s ('U') or wrap_t ('V'), which Assimp reads.
+std::string mayaWrap(std::string_view wrap, char axis) {
+    if (trimmed(wrap) == "CLAMP") return fmt::format("<wrap{0}>0</wrap{0}>", axis);
+    if (trimmed(wrap) == "MIRROR") return fmt::format("<mirror{0}>1</mirror{0}>", axis);
+    return {};
+}
+
 }  // namespace
 
 Result<PlainCollada> plainCollada(ByteSpan bytes) {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     PlainCollada out;
-    std::set<std::uint32_t> sets;
+    std::map<std::uint32_t, std::size_t> sets;        // and how many are before each
     std::map<std::string_view, std::uint32_t> setOf;  // of what bind_vertex_input names
     STX_CHECK(eachTag(text, [&](std::size_t at) -> Result<void> {
         const auto tag = text.substr(at);
         if (tag.starts_with("<input") && attributeOf(tag, "semantic") == "TEXCOORD")
-            sets.insert(numberIn(attributeOf(tag, "set")));
+            sets.emplace(numberIn(attributeOf(tag, "set")), 0);
         if (tag.starts_with("<bind_vertex_input")) {
             const auto set = numberIn(attributeOf(tag, "input_set"));
             const auto [bound, isNew] = setOf.emplace(attributeOf(tag, "semantic"), set);
@@ -136,10 +146,17 @@ Result<PlainCollada> plainCollada(ByteSpan bytes) {
         }
         for (const std::string_view name : {"wrap_s", "wrap_t"}) {
             const auto wrap = trimmed(contentOf(tag, name));
-            if (out.wrap.empty() && !wrap.empty() && wrap != "WRAP") out.wrap = wrap;
+            const bool known =
+                wrap.empty() || wrap == "WRAP" || wrap == "CLAMP" || wrap == "MIRROR";
+            if (out.wrap.empty() && !known) out.wrap = wrap;
         }
         return {};
     }));
+    std::size_t before = 0;
+    for (auto& [set, number] : sets) number = before++;
+    // Of an effect's parameters, by sid: along s and t.
+    std::map<std::string_view, std::pair<std::string, std::string>> wraps;
+    std::string_view parameter;
     std::size_t copied = 0;
     const auto replace = [&](std::size_t from, std::size_t to, std::string_view with) {
         out.text += text.substr(copied, from - copied);
@@ -148,14 +165,28 @@ Result<PlainCollada> plainCollada(ByteSpan bytes) {
     };
     STX_CHECK(eachTag(text, [&](std::size_t at) -> Result<void> {
         const auto tag = text.substr(at);
+        if (tag.starts_with("<effect")) wraps.clear();
+        if (tag.starts_with("<newparam")) parameter = attributeOf(tag, "sid");
+        if (auto wrap = mayaWrap(contentOf(tag, "wrap_s"), 'U'); !wrap.empty())
+            wraps[parameter].first = std::move(wrap);
+        if (auto wrap = mayaWrap(contentOf(tag, "wrap_t"), 'V'); !wrap.empty())
+            wraps[parameter].second = std::move(wrap);
         if (tag.starts_with("<texture")) {
-            const auto name = attributeOf(tag, "texcoord");
-            if (name.empty()) return {};
-            const auto bound = setOf.find(name);
-            const auto set = bound == setOf.end() ? sets.end() : sets.find(bound->second);
-            const auto number = set == sets.end() ? 0 : std::distance(sets.begin(), set);
-            const auto from = static_cast<std::size_t>(name.data() - text.data());
-            replace(from, from + name.size(), fmt::format("{}", number));
+            if (const auto name = attributeOf(tag, "texcoord"); !name.empty()) {
+                const auto bound = setOf.find(name);
+                const auto set = bound == setOf.end() ? sets.end() : sets.find(bound->second);
+                const auto number = set == sets.end() ? 0 : set->second;
+                const auto from = static_cast<std::size_t>(name.data() - text.data());
+                replace(from, from + name.size(), fmt::format("{}", number));
+            }
+            const auto wrap = wraps.find(attributeOf(tag, "texture"));
+            const auto end = text.find_first_of("<>", at + 1);
+            if (wrap == wraps.end() || end == std::string_view::npos || text[end] == '<') return {};
+            const bool isEmpty = text[end - 1] == '/';
+            replace(
+                isEmpty ? end - 1 : end, end + 1,
+                fmt::format("><extra><technique profile=\"MAYA\">{}{}</technique></extra>{}",
+                            wrap->second.first, wrap->second.second, isEmpty ? "</texture>" : ""));
             return {};
         }
         std::optional<glm::dmat4> parentFromHere = lookat(contentOf(tag, "lookat"));

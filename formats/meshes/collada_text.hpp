@@ -20,6 +20,7 @@ struct PlainCollada {
 ///  - `texcoord` of textures as the number of the set of texture coordinates that
 ///    `bind_vertex_input` gives it, counted among the sets of the file; 0 where none does. Assimp
 ///    ignores what is bound, takes a number from the name, and leaves out sets that do not exist.
+///  - `wrap_s` and `wrap_t` of samplers, which Assimp ignores, as what Maya writes into textures.
 /// Errors (invalidInput): a skew whose angle reaches its axis of translation.
 [[nodiscard]] Result<PlainCollada> plainCollada(ByteSpan text);
 

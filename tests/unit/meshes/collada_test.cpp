@@ -1,6 +1,8 @@
 #include <array>
 #include <cmath>
 
+#include "formats/images/images.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tests/unit/meshes/models.hpp"
 
 namespace stx {
@@ -123,15 +125,31 @@ TEST(Collada, TexturesHaveTheSetOfCoordinatesThatIsBound) {
                   0.25f);
 }
 
-TEST(Collada, WrapThatIsNotReadIsSaid) {
-    const std::string note = "wrap_s and wrap_t of samplers are not read";
-    const auto with = [](const std::string& sampler) {
-        return readGoodText(colladaWithSets(0, 1, "", sampler), "a.dae");
+TEST(Collada, SamplersWrap) {
+    TemporaryFolder folder;
+    const std::vector<std::uint8_t> grey(4, 128);
+    const auto png = encodePng(1, 1, 4, 8, grey.data(), true);
+    ASSERT_TRUE(png && writeFile(folder / "t.png", *png));
+    using Wrap = MeshTexture::Wrap;
+    const auto with = [&](const std::string& sampler, Wrap u, Wrap v) {
+        const auto text = colladaWithSets(0, 1, "", sampler);
+        EXPECT_TRUE(writeFile(folder / "a.dae", std::as_bytes(std::span(text))));
+        auto model = readGood(folder / "a.dae");
+        EXPECT_EQ(model.mesh.textures.size(), 1u);
+        if (model.mesh.textures.empty()) return model;
+        EXPECT_EQ(model.mesh.textures[0].wrapU, u) << sampler;
+        EXPECT_EQ(model.mesh.textures[0].wrapV, v) << sampler;
+        return model;
     };
-    EXPECT_FALSE(with("<wrap_s>WRAP</wrap_s><wrap_t> WRAP </wrap_t>").hasNote(note));
-    EXPECT_TRUE(with("<wrap_s>WRAP</wrap_s><wrap_t>CLAMP</wrap_t>")
-                    .hasNote(note + " ('CLAMP' is the first): textures repeat"));
-    EXPECT_TRUE(with("<wrap_s> MIRROR</wrap_s>").hasNote("'MIRROR'"));
+    with("", Wrap::repeat, Wrap::repeat);
+    with("<wrap_s>WRAP</wrap_s><wrap_t> CLAMP </wrap_t>", Wrap::repeat, Wrap::clamp);
+    with("<wrap_s>CLAMP</wrap_s>", Wrap::clamp, Wrap::repeat);
+    const auto mirror =
+        with("<wrap_s>MIRROR</wrap_s><wrap_t>MIRROR</wrap_t>", Wrap::mirror, Wrap::mirror);
+    EXPECT_TRUE(mirror.notes.empty()) << mirror.notes[0];
+    EXPECT_TRUE(with("<wrap_s>BORDER</wrap_s>", Wrap::repeat, Wrap::repeat)
+                    .hasNote("wrap 'BORDER' of samplers is not read, only WRAP, CLAMP and MIRROR: "
+                             "textures repeat"));
 }
 
 TEST(Collada, SkinsAreInThePoseOfTheirBones) {
