@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <new>
+#include <set>
 
 #include "formats/meshes/alpha_map.hpp"
+#include "formats/meshes/collada_text.hpp"
 #include "formats/meshes/foreign_scene.hpp"
 #include "formats/meshes/mesh_builder.hpp"
 #include "formats/meshes/mtl_notes.hpp"
@@ -66,14 +68,13 @@ class SceneConverter {
             builder_.materials().push_back({.name = "default", .hasColour = false});
             mtlOf_.emplace_back();
         }
-        std::vector<glm::dmat4> worldFromNode;
-        for (const auto& node : scene_.nodes) {
-            worldFromNode.push_back(node.parent < 0 ? glm::dmat4(node.parentFromNode)
-                                                    : worldFromNode[node.parent] *
-                                                          glm::dmat4(node.parentFromNode));
-            for (const std::uint32_t mesh : node.meshes)
-                STX_CHECK(convertMesh(scene_.meshes[mesh], worldFromNode.back()));
-        }
+        for (const auto& node : scene_.nodes)
+            worldFromNode_.push_back(node.parent < 0 ? glm::dmat4(node.parentFromNode)
+                                                     : worldFromNode_[node.parent] *
+                                                           glm::dmat4(node.parentFromNode));
+        for (std::size_t i = 0; i < scene_.nodes.size(); ++i)
+            for (const std::uint32_t mesh : scene_.nodes[i].meshes)
+                STX_CHECK(convertMesh(scene_.meshes[mesh], worldFromNode_[i]));
         if (scene_.animations > 0)
             files_.job().note(fmt::format("dropped: animations ({})", scene_.animations));
         if (lines_ > 0) files_.job().note(fmt::format("dropped: lines ({})", lines_));
@@ -139,9 +140,21 @@ class SceneConverter {
             if (has)
                 files_.job().note(fmt::format("material '{}': its {} is dropped", m.name, label));
         }
+        noteUvSets(source);
         builder_.materials().push_back(std::move(m));
         mtlOf_.push_back(mtl);
         return {};
+    }
+
+    void noteUvSets(const ForeignScene::Material& source) {
+        std::set<std::uint32_t> sets;
+        for (const auto& texture : source.textures)
+            if (texture) sets.insert(texture->uvSet);
+        if (sets.size() > 1)
+            files_.job().note(fmt::format(
+                "material '{}': its maps have several sets of texture coordinates; all are drawn "
+                "with that of the first",
+                source.name));
     }
 
     /// Materials that a `usemtl` names and no material file has.
@@ -222,21 +235,63 @@ class SceneConverter {
         return files_.textureFromBytes(inside.bytes, name, state, builder_.textures());
     }
 
-    /// Positions, normals, colours and texture coordinates.
-    void addVertices(const ForeignScene::Mesh& mesh, const glm::dmat4& worldFromMesh,
-                     MeshPart& part) const {
-        const bool moved = worldFromMesh != glm::dmat4(1.0);
-        for (const glm::dvec3 p : mesh.positions)
-            part.positions.push_back(moved ? glm::dvec3(worldFromMesh * glm::dvec4(p, 1.0)) : p);
+    /// Where a skin brings each vertex: the mean of its bones by weight. A vertex without any
+    /// follows the mesh's node.
+    Result<std::vector<glm::dmat4>> poses(const ForeignScene::Mesh& mesh,
+                                          const glm::dmat4& worldFromMesh,
+                                          const std::string& where) {
+        const auto count = mesh.positions.size();
+        STX_CHECK(builder_.charge(count, sizeof(glm::dmat4) + sizeof(double), where));
+        std::vector<glm::dmat4> worldFromVertex(count, glm::dmat4(0.0));
+        std::vector<double> sums(count, 0.0);
+        const models::BoneWeight* weight = mesh.weights.data();
+        for (const auto& bone : mesh.bones) {
+            const auto worldFromBone = worldFromNode_[bone.node] * glm::dmat4(bone.nodeFromMesh);
+            for (std::uint32_t k = 0; k < bone.weights; ++k, ++weight) {
+                worldFromVertex[weight->vertex] += worldFromBone * double{weight->weight};
+                sums[weight->vertex] += weight->weight;
+            }
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            if (sums[i] == 0)
+                worldFromVertex[i] = worldFromMesh;
+            else
+                worldFromVertex[i] /= sums[i];
+        }
+        return worldFromVertex;
+    }
+
+    /// Positions, normals, colours and texture coordinates; triangles face the other way where
+    /// most vertices are mirrored.
+    Result<void> addVertices(const ForeignScene::Mesh& mesh, const glm::dmat4& worldFromMesh,
+                             MeshPart& part, bool& mirrored) {
+        std::vector<glm::dmat4> posed;
+        if (!mesh.bones.empty()) STX_SET(posed, poses(mesh, worldFromMesh, part.where));
+        const bool moved = !posed.empty() || worldFromMesh != glm::dmat4(1.0);
+        const auto worldFrom = [&](std::size_t i) -> const glm::dmat4& {
+            return posed.empty() ? worldFromMesh : posed[i];
+        };
+        for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+            const glm::dvec3 p = mesh.positions[i];
+            part.positions.push_back(moved ? glm::dvec3(worldFrom(i) * glm::dvec4(p, 1.0)) : p);
+        }
+        const auto isMirrored = [](const glm::dmat4& m) {
+            return glm::determinant(glm::dmat3(m)) < 0;
+        };
+        mirrored = posed.empty() ? isMirrored(worldFromMesh)
+                                 : std::ranges::count_if(posed, isMirrored) >
+                                       static_cast<std::ptrdiff_t>(posed.size() / 2);
         // A facet's normal in STL is often wrong or zero, and says no more than its corners.
         if (!mesh.normals.empty() && format_ != AssimpFormat::stl) {
-            // Cofactors: the inverse transpose but for a factor.
-            const glm::dmat3 m(worldFromMesh);
-            const glm::dmat3 forNormals(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]),
-                                        glm::cross(m[0], m[1]));
-            const double side = glm::determinant(m) < 0 ? -1.0 : 1.0;
-            for (const auto& n : mesh.normals)
+            for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
+                // Cofactors: the inverse transpose but for a factor.
+                const glm::dmat3 m(worldFrom(i));
+                const glm::dmat3 forNormals(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]),
+                                            glm::cross(m[0], m[1]));
+                const double side = glm::determinant(m) < 0 ? -1.0 : 1.0;
+                const auto& n = mesh.normals[i];
                 part.normals.push_back(moved ? glm::vec3(forNormals * glm::dvec3(n) * side) : n);
+            }
         }
         if (!mesh.colours.empty()) {
             part.colours = mesh.colours;
@@ -250,6 +305,7 @@ class SceneConverter {
                 part.uvs.emplace_back(uv.x, 1.0f - uv.y);
             }
         }
+        return {};
     }
 
     /// Faces cut into triangles; counts lines and, where there are triangles, points.
@@ -306,9 +362,10 @@ class SceneConverter {
         part.where = mesh.name.empty() ? "the mesh" : fmt::format("mesh '{}'", mesh.name);
         STX_CHECK(builder_.charge(mesh.positions.size(), 80, part.where));
         part.material = mesh.material < builder_.materials().size() ? mesh.material : 0;
-        addVertices(mesh, worldFromMesh, part);
+        bool mirrored = false;
+        STX_CHECK(addVertices(mesh, worldFromMesh, part, mirrored));
         addFaces(mesh, part);
-        if (glm::determinant(glm::dmat3(worldFromMesh)) < 0)
+        if (mirrored)
             for (auto& t : part.triangles) std::swap(t.y, t.z);
         if (part.triangles.empty() && !part.points) return {};
         dropTexturesWithoutUvs(part);
@@ -322,6 +379,7 @@ class SceneConverter {
     MeshBuilder builder_;
     std::map<std::string, MtlMaterial> mtl_;
     std::vector<MtlMaterial> mtlOf_;  ///< of each material
+    std::vector<glm::dmat4> worldFromNode_;
     std::string materialFolder_;
     std::size_t lines_ = 0, points_ = 0;
     bool saysUndefined_ = false;  ///< nothing has been said of materials without a file
@@ -385,6 +443,11 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         std::optional<Bytes> zeros;
         if (format == AssimpFormat::obj) zeros = withLeadingZeros(bytes);
         if (zeros) bytes = *zeros;
+        PlainCollada collada;
+        if (format == AssimpFormat::dae) {
+            STX_SET(collada, plainCollada(bytes));
+            bytes = std::as_bytes(std::span(collada.text));
+        }
         std::optional<PlainText> plain;
         if (format == AssimpFormat::obj) plain = plainCoordinates(bytes, "v");
         if (format == AssimpFormat::stl) plain = plainCoordinates(bytes, "vertex");
@@ -406,6 +469,14 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         if (!side.missing().empty() && side.texts().empty())
             files.job().note(
                 fmt::format("material file {}; its materials have no colour", side.missing()));
+        if (!collada.wrap.empty())
+            files.job().note(fmt::format(
+                "wrap '{}' of samplers is not read, only WRAP, CLAMP and MIRROR: textures repeat",
+                collada.wrap));
+        if (!collada.boundTwice.empty())
+            files.job().note(fmt::format(
+                "'{}' is bound to several sets of texture coordinates; all textures have the first",
+                collada.boundTwice));
         return SceneConverter(scene, format, files, side, plain ? plain->origin : glm::dvec3(0.0))
             .convert();
     } catch (const std::bad_alloc&) {

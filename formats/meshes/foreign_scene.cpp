@@ -29,6 +29,7 @@ ForeignScene::Material materialIn(Unpacker& in) {
         to.name = in.getText();
         to.wrapU = in.get<std::uint8_t>();
         to.wrapV = in.get<std::uint8_t>();
+        to.uvSet = in.get<std::uint32_t>();
         to.embedded = in.get<std::int32_t>();
     }
     material.hasBump = in.get<std::uint8_t>() != 0;
@@ -85,8 +86,8 @@ bool receiveArray(DecoderProcess& process, std::vector<T>& to, std::uint64_t cou
     return process.receive(to.data(), count * sizeof(T));
 }
 
-Result<ForeignScene::Mesh> receiveMesh(DecoderProcess& process, const Limits& limits,
-                                       std::uint64_t& total) {
+Result<ForeignScene::Mesh> receiveMesh(DecoderProcess& process, std::size_t nodes,
+                                       const Limits& limits, std::uint64_t& total) {
     constexpr std::uint64_t kLongestName = 1 << 16;
     decoders::MessageHead head;
     std::uint64_t nameLength = 0;
@@ -110,13 +111,22 @@ Result<ForeignScene::Mesh> receiveMesh(DecoderProcess& process, const Limits& li
         !receiveArray(process, mesh.colours, facts.colours ? facts.positions : 0) ||
         !receiveArray(process, mesh.uvs, facts.uvs ? facts.positions : 0) ||
         !receiveArray(process, mesh.cornerCounts, facts.triangles ? 0 : facts.faces) ||
-        !receiveArray(process, mesh.corners, facts.corners))
+        !receiveArray(process, mesh.corners, facts.corners) ||
+        !receiveArray(process, mesh.bones, facts.bones) ||
+        !receiveArray(process, mesh.weights, facts.weights))
         return senseless();
     std::uint64_t corners = facts.triangles ? facts.faces * 3 : 0;
     for (const std::uint32_t count : mesh.cornerCounts) corners += count;
     const bool inside = std::ranges::all_of(
         mesh.corners, [&](std::uint32_t corner) { return corner < facts.positions; });
-    if (corners != facts.corners || !inside) return senseless();
+    std::uint64_t weights = 0;
+    for (const auto& bone : mesh.bones) weights += bone.weights;
+    const bool bonesFit =
+        weights == facts.weights &&
+        std::ranges::all_of(mesh.bones, [&](const auto& bone) { return bone.node < nodes; }) &&
+        std::ranges::all_of(mesh.weights,
+                            [&](const auto& weight) { return weight.vertex < facts.positions; });
+    if (corners != facts.corners || !inside || !bonesFit) return senseless();
     return mesh;
 }
 
@@ -128,7 +138,7 @@ Result<ForeignScene> receiveScene(DecoderProcess& process, ByteSpan content, con
     if (!scene) return senseless();
     std::uint64_t total = content.size();
     for (std::uint32_t i = 0; i < meshes; ++i) {
-        STX_TRY(auto mesh, receiveMesh(process, limits, total));
+        STX_TRY(auto mesh, receiveMesh(process, scene->nodes.size(), limits, total));
         scene->meshes.push_back(std::move(mesh));
     }
     return std::move(*scene);

@@ -16,11 +16,12 @@ namespace stx {
 struct ForeignTexture {
     std::string name;
     std::uint8_t wrapU = 0, wrapV = 0;  ///< values of MeshTexture::Wrap
+    std::uint32_t uvSet = 0;            ///< number of the texture coordinates that it is drawn with
     std::int32_t embedded = -1;         ///< its number among ForeignScene::embedded, when inside
 };
 
 /// A model as the library that reads it has it, before it is a Mesh: what its process tells
-/// (Tag::scene, then Tag::mesh for each mesh). Numbers of meshes and corners are checked.
+/// (Tag::scene, then Tag::mesh for each mesh). Numbers of meshes, nodes and vertices are checked.
 struct ForeignScene {
     using Texture = ForeignTexture;
     using Use = models::TextureUse;
@@ -47,9 +48,11 @@ struct ForeignScene {
         std::vector<glm::vec3> positions;
         std::vector<glm::vec3> normals;  ///< as many, or none; so are the next two
         std::vector<glm::vec4> colours;
-        std::vector<glm::vec2> uvs;
+        std::vector<glm::vec2> uvs;               ///< of the set of its material's first texture
         std::vector<std::uint32_t> cornerCounts;  ///< of each face; empty: all are triangles
         std::vector<std::uint32_t> corners;       ///< numbers of positions, face after face
+        std::vector<models::Bone> bones;
+        std::vector<models::BoneWeight> weights;  ///< bone after bone
     };
 
     std::vector<Material> materials;

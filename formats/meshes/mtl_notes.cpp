@@ -13,14 +13,19 @@ namespace {
 
 /// `-s u v w`: one to three numbers behind an option; v stays as it is when only u is given.
 void readVector(std::string_view text, std::string_view option, glm::vec2& to) {
+    // A word of its own, not a part of a name.
+    const auto isWord = [&](std::size_t at) {
+        const auto end = at + option.size();
+        return (at == 0 || isBlank(text[at - 1])) && end < text.size() && isBlank(text[end]);
+    };
     auto at = text.find(option);
-    // A word of its own, not the end of a name.
-    if (at == std::string_view::npos || (at > 0 && text[at - 1] != ' ' && text[at - 1] != '\t'))
-        return;
+    while (at != std::string_view::npos && !isWord(at)) at = text.find(option, at + 1);
+    if (at == std::string_view::npos) return;
     text.remove_prefix(at + option.size());
     for (int k = 0; k < 2; ++k) {
         while (!text.empty() && (text.front() == ' ' || text.front() == '\t'))
             text.remove_prefix(1);
+        if (text.starts_with('+')) text.remove_prefix(1);
         float value = 0;
         const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
         const auto used = static_cast<std::size_t>(end - text.data());
@@ -51,6 +56,44 @@ bool hasHalo(const MtlLine& line) {
     return line.key == "d" && line.value.starts_with(kHalo);
 }
 
+bool isMap(std::string_view key) {
+    constexpr std::string_view kOthers[] = {"bump", "decal", "disp", "norm", "refl"};
+    return key.starts_with("map_") || std::ranges::find(kOthers, key) != std::end(kOthers);
+}
+
+std::string_view takeWord(std::string_view& text) {
+    const auto word = text.substr(0, text.find_first_of(" \t"));
+    text = trimmed(text.substr(word.size()));
+    return word;
+}
+
+/// Whether it begins with a number and has more behind it: the last word is the file's name.
+bool beginsWithNumber(std::string_view text) {
+    auto word = takeWord(text);
+    if (word.starts_with('+')) word.remove_prefix(1);
+    float value = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    return error == std::errc() && end == word.data() + word.size() && !text.empty();
+}
+
+/// What is behind the key of a map, all of u, v and w given in its options.
+std::string withWholeOptions(std::string_view value) {
+    std::string out;
+    while (value.starts_with('-')) {
+        const auto option = takeWord(value);
+        out += fmt::format("{} ", option);
+        // What begins with no number is left to Assimp.
+        const bool vector =
+            (option == "-o" || option == "-s" || option == "-t") && beginsWithNumber(value);
+        const int most = vector ? 3 : option == "-mm" ? 2 : 1;
+        int found = 0;
+        for (; found < most && (!vector || beginsWithNumber(value)); ++found)
+            out += fmt::format("{} ", takeWord(value));
+        for (; vector && found < most; ++found) out += option == "-s" ? "1 " : "0 ";
+    }
+    return out.append(value);
+}
+
 }  // namespace
 
 std::string plainMtl(std::string_view text) {
@@ -66,6 +109,8 @@ std::string plainMtl(std::string_view text) {
             out += fmt::format("{0} {1} {1} {1}\n", line.key, number);
         else if (hasHalo(line))
             out += fmt::format("d {}\n", trimmed(line.value.substr(kHalo.size())));
+        else if (isMap(line.key) && line.value.starts_with('-'))
+            out += fmt::format("{} {}\n", line.key, withWholeOptions(line.value));
         else
             out += before.substr(0, before.size() - text.size());
     }
@@ -117,8 +162,8 @@ void scanMtl(std::string_view text, std::map<std::string, MtlMaterial>& material
             if (quoted) file.remove_suffix(1);
             (key == "map_Kd" ? current->diffuseMap : current->alphaMap) = file;
             if (key == "map_Kd") {
-                readVector(value, "-s ", current->uvScale);
-                readVector(value, "-o ", current->uvOffset);
+                readVector(value, "-s", current->uvScale);
+                readVector(value, "-o", current->uvOffset);
             }
             for (const std::string_view option : {"-t ", "-mm ", "-boost "}) {
                 if (key == "map_Kd" && value.find(option) != std::string_view::npos)

@@ -21,7 +21,8 @@ struct MtlMaterial {
 };
 
 /// An MTL text as Assimp reads it right: one value of a colour is all three (it would take the
-/// others for 0), and -halo of d, which it takes for a number, is left out.
+/// others for 0), -halo of d, which it takes for a number, is left out, and -o, -s and -t of maps
+/// have u, v and w, of which the last two may be left out (it would take the file's name for one).
 [[nodiscard]] std::string plainMtl(std::string_view text);
 
 /// The files that what follows a `mtllib` names. Names may have blanks: one ends with ".mtl".

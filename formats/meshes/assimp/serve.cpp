@@ -173,6 +173,7 @@ class SceneTeller {
         mode = aiTextureMapMode_Wrap;
         from.Get(AI_MATKEY_MAPPINGMODE_V(type, 0), mode);
         out_.put(wrap(mode));
+        out_.put(static_cast<std::uint32_t>(uvSetOf(from, type)));
         std::int32_t number = -1;
         if (const aiTexture* inside = scene_.GetEmbeddedTexture(name.C_Str())) {
             const auto [at, added] =
@@ -183,24 +184,70 @@ class SceneTeller {
         out_.put(number);
     }
 
+    static glm::mat4 toMatrix(const aiMatrix4x4& m) {
+        return glm::transpose(glm::mat4(m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2,
+                                        m.c3, m.c4, m.d1, m.d2, m.d3, m.d4));
+    }
+
+    /// What turns the axes of FBX's GlobalSettings to ours: x to the right, y up, z to the front.
+    /// Axes that are no rotation are not believed.
+    [[nodiscard]] glm::mat4 worldFromFile() const {
+        const glm::mat4 none(1.0f);
+        if (!scene_.mMetaData) return none;
+        glm::mat3 rows(0.0f);
+        constexpr std::pair<const char*, const char*> kKeys[] = {{"CoordAxis", "CoordAxisSign"},
+                                                                 {"UpAxis", "UpAxisSign"},
+                                                                 {"FrontAxis", "FrontAxisSign"}};
+        for (int row = 0; row < 3; ++row) {
+            std::int32_t axis = 0, sign = 0;
+            if (!scene_.mMetaData->Get(kKeys[row].first, axis) ||
+                !scene_.mMetaData->Get(kKeys[row].second, sign) || axis < 0 || axis > 2)
+                return none;
+            rows[row][axis] = sign < 0 ? -1.0f : 1.0f;
+        }
+        return glm::determinant(rows) == 1.0f ? glm::mat4(glm::transpose(rows)) : none;
+    }
+
+    static int uvSetOf(const aiMaterial& material, aiTextureType type) {
+        int set = 0;
+        material.Get(AI_MATKEY_UVWSRC(type, 0), set);
+        return set;
+    }
+
+    /// The texture coordinates of the first texture of a mesh's material. Assimp leaves out sets
+    /// that a mesh does not have, so a number behind the last is that one.
+    [[nodiscard]] const aiVector3D* uvsOf(const aiMesh& mesh) const {
+        const auto arrays = static_cast<int>(mesh.GetNumUVChannels());
+        if (arrays == 0 || mesh.mMaterialIndex >= scene_.mNumMaterials)
+            return mesh.mTextureCoords[0];
+        const aiMaterial& material = *scene_.mMaterials[mesh.mMaterialIndex];
+        const auto* type = std::ranges::find_if(
+            kTypes, [&](aiTextureType each) { return material.GetTextureCount(each) > 0; });
+        const int set = type == std::end(kTypes) ? 0 : uvSetOf(material, *type);
+        return mesh.mTextureCoords[std::clamp(set, 0, arrays - 1)];
+    }
+
     void putNode(const aiNode& node, std::int32_t parent, Packer& to) {
         const std::int32_t self = nodes_++;
+        nodeOf_.emplace(node.mName.C_Str(), self);
         to.put(parent);
-        const auto& m = node.mTransformation;
-        to.put(glm::transpose(glm::mat4(m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2,
-                                        m.c3, m.c4, m.d1, m.d2, m.d3, m.d4)));
+        const glm::mat4 parentFromNode = toMatrix(node.mTransformation);
+        // Newer versions of Assimp turn the root themselves.
+        const bool turns = parent < 0 && parentFromNode == glm::mat4(1.0f);
+        to.put(turns ? worldFromFile() : parentFromNode);
         to.putBytes(std::as_bytes(std::span(node.mMeshes, node.mNumMeshes)));
         for (unsigned i = 0; i < node.mNumChildren; ++i) putNode(*node.mChildren[i], self, to);
     }
 
-    static bool sendMesh(const aiMesh& mesh) {
+    [[nodiscard]] bool sendMesh(const aiMesh& mesh) const {
+        const aiVector3D* given = uvsOf(mesh);
         MeshHead head;
         head.positions = mesh.mNumVertices;
         head.faces = mesh.mNumFaces;
         head.material = mesh.mMaterialIndex;
         head.normals = mesh.mNormals != nullptr;
         head.colours = mesh.mColors[0] != nullptr;
-        head.uvs = mesh.mTextureCoords[0] != nullptr;
+        head.uvs = given != nullptr;
         const std::span faces(mesh.mFaces, mesh.mNumFaces);
         head.triangles =
             std::ranges::all_of(faces, [](const auto& f) { return f.mNumIndices == 3; });
@@ -214,9 +261,23 @@ class SceneTeller {
         std::vector<glm::vec2> uvs;
         if (head.uvs) {
             uvs.reserve(head.positions);
-            for (const auto& uv : std::span(mesh.mTextureCoords[0], head.positions))
-                uvs.emplace_back(uv.x, uv.y);
+            for (const auto& uv : std::span(given, head.positions)) uvs.emplace_back(uv.x, uv.y);
         }
+        std::vector<Bone> bones;
+        std::vector<BoneWeight> weights;
+        for (const aiBone* bone : std::span(mesh.mBones, mesh.mNumBones)) {
+            const auto node = nodeOf_.find(bone->mName.C_Str());
+            if (node == nodeOf_.end()) continue;
+            const auto before = weights.size();
+            for (const auto& weight : std::span(bone->mWeights, bone->mNumWeights))
+                if (weight.mVertexId < mesh.mNumVertices)
+                    weights.push_back({weight.mVertexId, weight.mWeight});
+            bones.push_back({static_cast<std::uint32_t>(node->second),
+                             static_cast<std::uint32_t>(weights.size() - before),
+                             toMatrix(bone->mOffsetMatrix)});
+        }
+        head.bones = bones.size();
+        head.weights = weights.size();
         const std::string_view name = mesh.mName.C_Str();
         const std::uint64_t length = name.size();
         const auto send = [](const void* from, std::size_t size) {
@@ -233,12 +294,15 @@ class SceneTeller {
                (!head.colours || send(mesh.mColors[0], head.positions * sizeof(aiColor4D))) &&
                send(uvs.data(), uvs.size() * sizeof(uvs[0])) &&
                send(counts.data(), counts.size() * sizeof(counts[0])) &&
-               send(corners.data(), corners.size() * sizeof(corners[0]));
+               send(corners.data(), corners.size() * sizeof(corners[0])) &&
+               send(bones.data(), bones.size() * sizeof(bones[0])) &&
+               send(weights.data(), weights.size() * sizeof(weights[0]));
     }
 
     const aiScene& scene_;
     Packer out_;
     std::int32_t nodes_ = 0;
+    std::map<std::string, std::int32_t> nodeOf_;  ///< by name, the first of each
     std::vector<const aiTexture*> embedded_;
     std::map<const aiTexture*, std::int32_t> numbers_;
 };

@@ -162,6 +162,29 @@ TEST(Mtl, ScaleAndOffsetOfATextureMoveItsCoordinates) {
     EXPECT_TRUE(model.notes.empty()) << model.notes[0];
 }
 
+TEST(Mtl, VAndWOfAnOptionMayBeLeftOut) {
+    TemporaryFolder folder;
+    writePair(folder / "a.png", {255, 0, 0, 255}, {0, 255, 0, 255});
+    writePair(folder / "my -s 2 b.png", {255, 0, 0, 255}, {0, 255, 0, 255});
+    const auto corner = [&](const std::string& map) {
+        const auto model = objWith(folder, "map_Kd " + map + "\n");
+        EXPECT_EQ(model.mesh.textures.size(), 1u) << map;
+        EXPECT_TRUE(model.notes.empty()) << map << ": " << model.notes[0];
+        for (const auto& uv : model.mesh.uvs)
+            if (uv.x != model.mesh.uvs[0].x && uv.y == model.mesh.uvs[0].y) return uv;
+        return glm::vec2(-1);
+    };
+    EXPECT_EQ(corner("a.png"), glm::vec2(1, 1));
+    EXPECT_EQ(corner("-s 2 a.png"), glm::vec2(2, 1));
+    EXPECT_EQ(corner("-s 2 3 a.png"), glm::vec2(2, 1));
+    EXPECT_EQ(corner("-o .25 a.png"), glm::vec2(1.25, 1));
+    EXPECT_EQ(corner("-o 0.25 -0.5 a.png"), glm::vec2(1.25, 1.5));
+    EXPECT_EQ(corner("-clamp off -s 2 -o\t0.25  0.5 -bm 1 a.png"), glm::vec2(2.25, 0.5));
+    EXPECT_EQ(corner("-s 2 2 2 -o 1 1 1 a.png"), glm::vec2(3, 0));
+    EXPECT_EQ(corner("-s +2 a.png"), glm::vec2(2, 1));
+    EXPECT_EQ(corner("-s 2 my -s 2 b.png"), glm::vec2(2, 1));
+}
+
 TEST(Mtl, EmissionShines) {
     TemporaryFolder folder;
     expectNear(glm::vec3(colourOf(objWith(folder, "Kd 0 0 0\nKe 1 0.5 0\n").mesh)),
