@@ -123,6 +123,9 @@ CONSTANT float kSpreadRidge = 0.2f;
 // pixel in the frame moves that position by more than the root of kNarrowStep pixels along either axis: the
 // kernel has fallen to 1/400 there.
 CONSTANT float kNarrowStep = 1.3f, kNarrowReach = 1.5f;
+// A source gives colours up to so many pixels beyond its picture, where the same taps are nearest: what it shows goes on
+// there by kHalfBesideBackground from the middles of its last pixels, and nobody else may see it.
+CONSTANT float kBesidePicture = 0.5f;
 // A sample covers its own pixel, so a source as fine as the frame spreads by this share of its Jacobian,
 // a coarser one by more (metricOf).
 CONSTANT float kOwn = 0.15f;

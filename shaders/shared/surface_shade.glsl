@@ -28,7 +28,9 @@ SourceView viewOf(int s, Piece piece) {
     float u = rowAt(mx, x, y, q) * inverse, v = rowAt(my, x, y, q) * inverse;
     ivec2 size = sizeOf(s);
     view.at = vec2(u, v);
-    if (!(w > 0.0f && u >= 0.0f && v >= 0.0f && u < float(size.x) && v < float(size.y))) return view;
+    if (!(w > 0.0f && u >= -kBesidePicture && v >= -kBesidePicture && u < float(size.x) + kBesidePicture &&
+          v < float(size.y) + kBesidePicture))
+        return view;
     // Along the tangent plane the denominator and the numerators change with q as well.
     float wx = mw.x + mw.z * piece.qx, wy = mw.y + mw.z * piece.qy;
     float ux = (mx.x + mx.z * piece.qx - u * wx) * inverse;

@@ -127,9 +127,11 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
         const V series =
             hn::MulAdd(t, hn::MulAdd(t, hn::MulAdd(t, c(1.0f / 6), c(0.5f)), one), one);
         V weight = hn::Div(hn::Min(one, hn::Sqrt(hn::Max(det, c(kLeastArea)))), series);
-        const auto inFrame = hn::And(
-            hn::And(hn::Ge(u, hn::Zero(d)), hn::Lt(u, c(static_cast<float>(s.source->width)))),
-            hn::And(hn::Ge(v, hn::Zero(d)), hn::Lt(v, c(static_cast<float>(s.source->height)))));
+        const auto within = [&](V at, int size) HWY_ATTR {
+            return hn::And(hn::Ge(at, c(-kBesidePicture)),
+                           hn::Lt(at, c(static_cast<float>(size) + kBesidePicture)));
+        };
+        const auto inFrame = hn::And(within(u, s.source->width), within(v, s.source->height));
         const auto bits = hn::LoadU(du, g.sources + l);
         const auto chosen = hn::RebindMask(d, hn::TestBit(bits, hn::Set(du, bit)));
         const auto active = hn::And(hn::And(inFrame, chosen), hn::Gt(w, hn::Zero(d)));
