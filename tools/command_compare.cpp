@@ -1,8 +1,12 @@
+#include <algorithm>
+#include <limits>
 #include <map>
+#include <set>
 #include <tuple>
 
 #include <nlohmann/json.hpp>
 
+#include "formats/files/numbered.hpp"
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/base/printable.hpp"
@@ -136,17 +140,32 @@ Result<std::vector<Pair>> pairsOfFolders(const CompareOptions& o) {
     return pairs;
 }
 
-/// The frames of two sequences.
-std::vector<Pair> pairsOfSequences(const CompareOptions& o) {
-    std::vector<Pair> pairs;
-    for (int frame = o.firstFrame; o.frames == 0 || frame < o.firstFrame + o.frames; ++frame) {
-        Pair pair{*frameName(o.a, frame), *frameName(o.b, frame), frame, ""};
-        std::error_code ec;
-        if (o.frames == 0 && frame > o.firstFrame && !std::filesystem::exists(pair.a, ec) &&
-            !std::filesystem::exists(pair.b, ec))
-            break;
-        pairs.push_back(std::move(pair));
+/// Numbers of the frames of two sequences: as many as are asked for, else the first and all behind
+/// it that either has.
+std::set<int> framesOf(const CompareOptions& o, Job& job) {
+    std::set<int> frames = {o.firstFrame};
+    for (int frame = o.firstFrame; frame < o.firstFrame + o.frames; ++frame) frames.insert(frame);
+    if (o.frames > 0) return frames;
+    std::vector<NumberedFile> found = {{o.firstFrame, o.a}};
+    for (const std::string& pattern : {o.a, o.b}) {
+        const auto files = numberedFiles(pattern);
+        for (const NumberedFile& file : files.value_or(std::vector<NumberedFile>()))
+            if (file.number >= o.firstFrame && file.number <= std::numeric_limits<int>::max() &&
+                frames.insert(static_cast<int>(file.number)).second)
+                found.push_back(file);
     }
+    std::ranges::sort(found, {}, &NumberedFile::number);
+    if (const auto missing = firstMissing(found))
+        job.note(fmt::format("frame {} is in neither sequence; those that are there are compared",
+                             *missing));
+    return frames;
+}
+
+/// The frames of two sequences.
+std::vector<Pair> pairsOfSequences(const CompareOptions& o, Job& job) {
+    std::vector<Pair> pairs;
+    for (const int frame : framesOf(o, job))
+        pairs.push_back({*frameName(o.a, frame), *frameName(o.b, frame), frame, ""});
     return pairs;
 }
 
@@ -194,7 +213,7 @@ Result<ManyScores> compareMany(const CompareOptions& o, bool folders,
     if (folders)
         STX_SET(pairs, pairsOfFolders(o));
     else
-        pairs = pairsOfSequences(o);
+        pairs = pairsOfSequences(o, program.job);
     SequenceComparison sequence(255.0);
     for (const Pair& pair : pairs) {
         STX_CHECK(program.job.checkCancelled());

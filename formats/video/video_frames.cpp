@@ -230,6 +230,10 @@ Result<std::unique_ptr<VideoFrames>> openPictures(std::vector<fs::path> files, s
 Result<std::unique_ptr<VideoFrames>> openSequence(Result<std::vector<NumberedFile>> pictures,
                                                   const fs::path& input, bool strict, Job& job) {
     if (!pictures) return propagate(pictures);
+    if (const auto missing = strict ? firstMissing(*pictures) : std::nullopt)
+        return fail(ErrorCode::invalidInput,
+                    "'{}': frame {} is missing; without --strict the others are taken",
+                    input.string(), *missing);
     std::vector<fs::path> files;
     for (auto& picture : *pictures) files.push_back(std::move(picture.path));
     return openPictures(std::move(files), input.string(), strict, job);
@@ -243,9 +247,11 @@ Result<std::unique_ptr<VideoFrames>> openAnyFrames(const std::vector<fs::path>& 
         const bool folder = fs::is_directory(input, ec);
         const bool there = fs::exists(fs::status(input, ec));
         if (inputs.size() == 1) {
-            if (folder) return openSequence(numberedPictures(input, job), input, strict, job);
+            Job strictly;  // what is missing is an error, not a note
+            Job& heard = strict ? strictly : job;
+            if (folder) return openSequence(numberedPictures(input, heard), input, strict, job);
             if (!there && isSequencePattern(input))
-                return openSequence(picturesOfPattern(input, job), input, strict, job);
+                return openSequence(picturesOfPattern(input, heard), input, strict, job);
         }
         if (!there)
             return fail(ErrorCode::io, "cannot read '{}': {}", input.string(), whyNotThere(input));
