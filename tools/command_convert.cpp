@@ -81,11 +81,16 @@ constexpr const char* kSetHeading = "Image sets";
 /// What an input is read as.
 enum class Reads { mesh, moment, film };
 
+/// A photograph with depth, in its file or beside it.
+bool isPhoto(const Result<FileKind>& kind, const ConvertOptions& o) {
+    return kind && (*kind == FileKind::photo ||
+                    (*kind == FileKind::image && !o.open.set.depthPattern.empty()));
+}
+
 /// Whether an input is read as an image set. An .exr is a bundle or a picture with Z.
 bool isSet(const std::filesystem::path& input, const Result<FileKind>& kind,
            const ConvertOptions& o, const Limits& limits) {
-    if (!o.open.set.from.empty() || !kind || *kind == FileKind::imageSet ||
-        *kind == FileKind::photo)
+    if (!o.open.set.from.empty() || !kind || *kind == FileKind::imageSet || isPhoto(kind, o))
         return true;
     if (*kind != FileKind::exr) return false;
     const auto reader = ExrReader::open(input, limits);
@@ -108,7 +113,7 @@ void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptio
         auto options = o.givenOfMeshes;
         // Of an image set it is the pattern of names.
         if (set) std::erase(options, "--texture");
-        if (kind && *kind == FileKind::photo) std::erase(options, "--fov");
+        if (isPhoto(kind, o)) std::erase(options, "--fov");
         note(options, "meshes", kind ? nameOf(*kind) : "none");
     } else {
         std::vector<std::string> options;

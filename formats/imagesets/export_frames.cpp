@@ -37,9 +37,11 @@ class FrameExporter {
                 return tl::unexpected(done.error().at(
                     fmt::format("frame {} ({:g} s)", i, frames_.timeline().times[i])));
         }
-        // Camera by camera: one whose first picture is late keeps its place among them.
+        // The first of each camera, by which readers number them: one that starts late keeps its
+        // place.
         for (WrittenView& track : tracks_)
-            for (OutputJson& frame : track.frames) json_["frames"].push_back(std::move(frame));
+            if (!track.first.empty()) json_["frames"].push_back(std::move(track.first));
+        for (OutputJson& frame : later_) json_["frames"].push_back(std::move(frame));
         STX_TRY(const std::string text, setText(json_));
         STX_CHECK(writeFile(root_ / "transforms.json",
                             std::as_bytes(std::span(text.data(), text.size()))));
@@ -51,7 +53,7 @@ class FrameExporter {
     struct WrittenView {
         std::string name;  ///< of its newest files
         PicturesKey pictures;
-        std::vector<OutputJson> frames;
+        OutputJson first;
     };
 
     Result<void> add(std::size_t index) {
@@ -85,7 +87,9 @@ class FrameExporter {
         };
         STX_CHECK(forEachView(*table, peak::kExport, job, write));
         for (std::size_t k = 0; k < shown.size(); ++k)
-            if (!shown[k].empty()) tracks_[k].frames.push_back(std::move(shown[k]));
+            if (!shown[k].empty())
+                (tracks_[k].first.empty() ? tracks_[k].first : later_.emplace_back()) =
+                    std::move(shown[k]);
         return {};
     }
 
@@ -142,7 +146,8 @@ class FrameExporter {
     ColourLoss loss_;
     fs::path root_;
     OutputJson json_;
-    Bundle first_;  ///< names and cameras
+    std::vector<OutputJson> later_;  ///< frames behind the first of each view
+    Bundle first_;                   ///< names and cameras
     std::vector<WrittenView> tracks_;
     std::vector<std::string> names_;
     double unit_ = 0.001;
