@@ -128,6 +128,8 @@ Result<FileKind> recognise(const fs::path& path) {
         if (fs::exists(path / "atlas.json", ec)) return FileKind::atlas;
         return FileKind::imageSet;
     }
+    // A pipe whose first bytes were looked at has lost them, or waits for ever.
+    if (path != "-" && !fs::is_regular_file(status)) return notAFile(path);
     const auto head = headOf(path);
     const auto ending = lowerExtension(path);
     if (path.filename() == "atlas.json") return FileKind::atlas;

@@ -143,6 +143,13 @@ fs::path folderOf(const fs::path& path) {
     return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
 
+tl::unexpected<Error> notAFile(const fs::path& path) {
+    return fail(ErrorCode::io,
+                "cannot read '{}': it is a device or a pipe, not a file; use - for standard "
+                "input",
+                path.string());
+}
+
 Result<Bytes> readFile(const fs::path& path, const Limits& limits) {
     if (path == "-") return readToEnd(STDIN_FILENO, "standard input", 0, limits);
     // Without O_NONBLOCK the opening of a FIFO that nobody writes to would never return.
@@ -153,11 +160,7 @@ Result<Bytes> readFile(const fs::path& path, const Limits& limits) {
     if (::fstat(fd, &info) != 0) return failIo("read", path, errno);
     if (S_ISDIR(info.st_mode))
         return fail(ErrorCode::io, "cannot read '{}': it is a folder, not a file", path.string());
-    if (!S_ISREG(info.st_mode))
-        return fail(ErrorCode::io,
-                    "cannot read '{}': it is a device or a pipe, not a file; use - for standard "
-                    "input",
-                    path.string());
+    if (!S_ISREG(info.st_mode)) return notAFile(path);
     return readToEnd(fd, path, static_cast<std::uint64_t>(info.st_size), limits);
 }
 

@@ -18,6 +18,8 @@ using ByteSpan = std::span<const std::byte>;
 /// A whole file. "-" reads stdin. Errors (io): missing, a folder, not a regular file (FIFOs and
 /// devices are refused), unreadable; (invalidInput) larger than the memory limit.
 [[nodiscard]] Result<Bytes> readFile(const std::filesystem::path& path, const Limits& limits);
+/// The error (io) of a FIFO or a device where a file is expected.
+[[nodiscard]] tl::unexpected<Error> notAFile(const std::filesystem::path& path);
 
 /// A file that is written whole or not at all: bytes go to a temporary name beside the target,
 /// commit() flushes and renames. Destroyed without commit(): nothing stays. "-" is stdout.
