@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "formats/files/named_files.hpp"
 #include "formats/files/no_case.hpp"
+#include "formats/files/numbered.hpp"
 
 namespace stx::tools {
 namespace {
@@ -56,6 +58,22 @@ Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
         }
     }
     return {};
+}
+
+void rememberNumberedInputs(const std::vector<NamedPath>& outputs,
+                            const std::vector<NamedPath>& inputs) {
+    for (const NamedPath& input : inputs) {
+        std::error_code ec;
+        // A file may have such a name itself.
+        if (!frameName(input.path, 0) || fs::exists(input.path, ec)) continue;
+        const bool replaced = std::ranges::any_of(outputs, [&](const NamedPath& output) {
+            return output.replaces && samePath(output.path, input.path);
+        });
+        if (replaced) continue;
+        // Where none is there, opening the input says so.
+        if (const auto files = numberedFiles(input.path))
+            for (const NumberedFile& file : *files) rememberNamedFile(file.path);
+    }
 }
 
 Result<void> checkReportName(std::string_view path) {
