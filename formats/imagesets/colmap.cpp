@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "formats/files/messages.hpp"
+#include "formats/files/named_files.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/poses.hpp"
 #include "formats/imagesets/text_lines.hpp"
@@ -344,6 +345,7 @@ Result<std::vector<SetView>> colmapViews(const path& given, Job& job) {
     std::vector<SetView> views;
     for (const ColmapImage& image : m.images) {
         STX_TRY(auto view, viewOf(m, image, placeOf(m, image)));
+        rememberNamedFile(m.base / "images" / image.name);
         views.push_back(std::move(view));
     }
     // The file's order is that of the numbers that COLMAP gave; people expect that of the names.
