@@ -76,6 +76,24 @@ void rememberNumberedInputs(const std::vector<NamedPath>& outputs,
     }
 }
 
+Result<void> checkReportIsNoMainFile(const std::string& report,
+                                     const std::vector<NamedPath>& folders) {
+    static constexpr std::string_view kMainFiles[] = {"atlas.json",   "transforms.json",
+                                                      "cameras.json", "cameras.txt",
+                                                      "images.txt",   "points3D.txt"};
+    const fs::path file = wholePath(report);
+    if (std::ranges::find(kMainFiles, file.filename().string()) == std::end(kMainFiles)) return {};
+    for (const NamedPath& folder : folders)
+        for (fs::path up = file.parent_path(); up.has_relative_path(); up = up.parent_path())
+            if (samePath(up.string(), folder.path))
+                return fail(ErrorCode::usage,
+                            "--report '{}' is a file that {} '{}' has itself, which would be "
+                            "lost; give the report another name",
+                            report, folder.option.empty() ? "the input" : folder.option,
+                            folder.path);
+    return {};
+}
+
 Result<void> checkReportName(std::string_view path) {
     if (const auto ending = endingOfMedia(path); !ending.empty())
         return fail(

@@ -30,6 +30,12 @@ struct NamedPath {
 void rememberNumberedInputs(const std::vector<NamedPath>& outputs,
                             const std::vector<NamedPath>& inputs);
 
+/// Error (usage) where a report would be the main file of a folder that is an input or an output:
+/// an atlas' atlas.json, a set's transforms.json, cameras.json or files of COLMAP. It would be
+/// written where reading the folder fails, too.
+[[nodiscard]] Result<void> checkReportIsNoMainFile(const std::string& report,
+                                                   const std::vector<NamedPath>& folders);
+
 /// Error (usage) where a report's name ends like that of a picture, a film, a scene or a model: it
 /// would take the place of one, perhaps of a texture that the input names.
 [[nodiscard]] Result<void> checkReportName(std::string_view path);
