@@ -111,8 +111,13 @@ Result<void> checkPaths(const CLI::App& app, const PathOptions& paths) {
     for (const auto* option : paths.outputs)
         addNamedPaths(*option, option == paths.replacing, outputs);
     STX_CHECK(checkOutputNames(outputs, inputs));
-    for (const NamedPath& output : outputs)
-        if (output.option == "--report") STX_CHECK(checkReportName(output.path));
+    rememberNumberedInputs(outputs, inputs);
+    for (const NamedPath& output : outputs) {
+        if (output.option != "--report") continue;
+        STX_CHECK(checkReportName(output.path));
+        for (const auto& folders : {inputs, outputs})
+            STX_CHECK(checkReportIsNoMainFile(output.path, folders));
+    }
     return {};
 }
 
@@ -365,8 +370,9 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
 
 namespace {
 
-/// Whether a word beside --report names the file of the report, too.
-bool namesOther(const std::vector<std::string_view>& words, const std::string& report) {
+/// What the words beside --report may name.
+std::vector<NamedPath> othersOf(const std::vector<std::string_view>& words) {
+    std::vector<NamedPath> others;
     for (std::size_t i = 1; i < words.size(); ++i) {
         std::string_view word = words[i];
         if (word.starts_with("--report") || words[i - 1] == "--report") continue;
@@ -374,9 +380,9 @@ bool namesOther(const std::vector<std::string_view>& words, const std::string& r
             word.remove_prefix(std::min(word.find('='), word.size() - 1) + 1);
         else if (word.starts_with('-') || word.starts_with('@'))
             word.remove_prefix(word.starts_with('@') ? 1 : std::min<std::size_t>(2, word.size()));
-        if (samePath(std::string(word), report)) return true;
+        others.push_back({"", std::string(word)});
     }
-    return false;
+    return others;
 }
 
 }  // namespace
@@ -401,7 +407,10 @@ CommandLine::FailedRequest CommandLine::failedRequest(int argc, char** argv) con
         else if (rest.empty() && i + 1 < words.size() && !words[i + 1].starts_with('-'))
             request.report = words[++i];
     }
-    if (!checkReportName(request.report) || namesOther(words, request.report)) request.report = {};
+    const auto others = othersOf(words);
+    if (!checkReportName(request.report) || !checkReportIsNoMainFile(request.report, others) ||
+        std::ranges::any_of(others, [&](auto& o) { return samePath(o.path, request.report); }))
+        request.report = {};
     return request;
 }
 

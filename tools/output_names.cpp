@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "formats/files/named_files.hpp"
 #include "formats/files/no_case.hpp"
+#include "formats/files/numbered.hpp"
 
 namespace stx::tools {
 namespace {
@@ -55,6 +57,40 @@ Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
                             clash(*output, input));
         }
     }
+    return {};
+}
+
+void rememberNumberedInputs(const std::vector<NamedPath>& outputs,
+                            const std::vector<NamedPath>& inputs) {
+    for (const NamedPath& input : inputs) {
+        std::error_code ec;
+        // A file may have such a name itself.
+        if (!frameName(input.path, 0) || fs::exists(input.path, ec)) continue;
+        const bool replaced = std::ranges::any_of(outputs, [&](const NamedPath& output) {
+            return output.replaces && samePath(output.path, input.path);
+        });
+        if (replaced) continue;
+        // Where none is there, opening the input says so.
+        if (const auto files = numberedFiles(input.path))
+            for (const NumberedFile& file : *files) rememberNamedFile(file.path);
+    }
+}
+
+Result<void> checkReportIsNoMainFile(const std::string& report,
+                                     const std::vector<NamedPath>& folders) {
+    static constexpr std::string_view kMainFiles[] = {"atlas.json",   "transforms.json",
+                                                      "cameras.json", "cameras.txt",
+                                                      "images.txt",   "points3D.txt"};
+    const fs::path file = wholePath(report);
+    if (std::ranges::find(kMainFiles, file.filename().string()) == std::end(kMainFiles)) return {};
+    for (const NamedPath& folder : folders)
+        for (fs::path up = file.parent_path(); up.has_relative_path(); up = up.parent_path())
+            if (samePath(up.string(), folder.path))
+                return fail(ErrorCode::usage,
+                            "--report '{}' is a file that {} '{}' has itself, which would be "
+                            "lost; give the report another name",
+                            report, folder.option.empty() ? "the input" : folder.option,
+                            folder.path);
     return {};
 }
 

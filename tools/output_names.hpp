@@ -25,6 +25,17 @@ struct NamedPath {
 [[nodiscard]] Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
                                             const std::vector<NamedPath>& inputs);
 
+/// Remembers the files of numbered inputs (`name_%04d.png`) as files that an input names, but for a
+/// sequence that an output replaces: its files are renamed into their places one by one.
+void rememberNumberedInputs(const std::vector<NamedPath>& outputs,
+                            const std::vector<NamedPath>& inputs);
+
+/// Error (usage) where a report would be the main file of a folder that is an input or an output:
+/// an atlas' atlas.json, a set's transforms.json, cameras.json or files of COLMAP. It would be
+/// written where reading the folder fails, too.
+[[nodiscard]] Result<void> checkReportIsNoMainFile(const std::string& report,
+                                                   const std::vector<NamedPath>& folders);
+
 /// Error (usage) where a report's name ends like that of a picture, a film, a scene or a model: it
 /// would take the place of one, perhaps of a texture that the input names.
 [[nodiscard]] Result<void> checkReportName(std::string_view path);

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/decoders/decoder_process.hpp"
+#include "formats/files/named_files.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/files/source_date.hpp"
 #include "lib/base/parallel.hpp"
@@ -449,7 +450,7 @@ Result<void> checkTarget(const std::filesystem::path& target, Program& program) 
         std::filesystem::exists(std::filesystem::symlink_status(target, ec)))
         return fail(ErrorCode::io, "'{}' exists and --no-clobber forbids to replace it",
                     target.string());
-    return {};
+    return checkIsNotNamed(target);
 }
 
 }  // namespace stx::tools

@@ -7,6 +7,7 @@
 #include "formats/atlas/atlas_json.hpp"
 #include "formats/atlas/atlas_textures.hpp"
 #include "formats/exr/environment_exr.hpp"
+#include "formats/files/named_files.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/parallel_try.hpp"
 #include "lib/model/peak_memory.hpp"
@@ -343,6 +344,7 @@ Result<AtlasHeader> exrHeader(const ExrReader& reader, const Limits& limits,
 Result<AtlasHeader> folderHeader(const fs::path& path, const Limits& limits,
                                  AtlasChecks checks = AtlasChecks::all) {
     const fs::path index = setFolderOf(path) / kIndexFile;
+    rememberNamedFile(index);
     STX_TRY(const auto bytes, readFile(index, limits));
     const auto where = fmt::format("'{}'", index.string());
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());

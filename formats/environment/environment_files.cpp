@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "formats/exr/environment_exr.hpp"
+#include "formats/files/named_files.hpp"
 #include "formats/files/not_there.hpp"
 #include "formats/images/images.hpp"
 #include "formats/mpeg4/mapping/background.hpp"
@@ -66,8 +67,10 @@ Result<std::array<fs::path, 6>> faceFiles(const fs::path& folder) {
 
 Result<std::shared_ptr<const Environment>> openFolder(const fs::path& folder, Job& job) {
     std::error_code ec;
-    if (fs::exists(folder / kFileInFolder, ec))
+    if (fs::exists(folder / kFileInFolder, ec)) {
+        rememberNamedFile(folder / kFileInFolder);
         return readEnvironmentExr(folder / kFileInFolder, job);
+    }
     STX_TRY(const auto files, faceFiles(folder));
     const std::string where = fmt::format("'{}'", folder.string());
     auto environment = std::make_shared<Environment>();
@@ -79,6 +82,7 @@ Result<std::shared_ptr<const Environment>> openFolder(const fs::path& folder, Jo
             missing += (missing.empty() ? "" : ", ") + std::string(kCubeFaceNames[f]);
             continue;
         }
+        rememberNamedFile(files[f]);
         STX_TRY(Texture picture, readPicture(files[f], job));
         if (picture.width() != picture.height())
             return failAt(fmt::format("'{}'", files[f].string()), ErrorCode::invalidInput,

@@ -338,6 +338,7 @@ Result<OutputFolder> OutputFolder::create(const fs::path& target, OutputFile::Op
         return fail(ErrorCode::io, "cannot write '{}': it is a file, not a folder",
                     target.string());
     if (fs::exists(status) && options.noClobber) return failExists(target);
+    STX_CHECK(checkIsNotNamed(named));
     STX_TRY(impl->real, throughLinks(named));
 
     const fs::path folder = folderOf(impl->real);

@@ -44,9 +44,9 @@ Result<void> checkIsNotNamed(const std::filesystem::path& target) {
     const std::lock_guard lock(all.mutex);
     if (!all.numbers.contains({status.st_dev, status.st_ino})) return {};
     return fail(ErrorCode::usage,
-                "'{}' is a file that the input names, which would be lost; give the output another "
+                "'{}' is a {} that the input names, which would be lost; give the output another "
                 "name",
-                target.string());
+                target.string(), S_ISDIR(status.st_mode) ? "folder" : "file");
 }
 
 }  // namespace stx

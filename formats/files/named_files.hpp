@@ -6,17 +6,19 @@
 
 namespace stx {
 
-/// The files that inputs name: the textures of a model, the pictures of a set. A program that
-/// writes beside its inputs must not replace one by accident (`render amphora.obj -o amphora.png`).
+/// The files that inputs name: the textures of a model, the pictures of a set or a folder, the
+/// files of a pattern (name_%04d.png). A program that writes beside its inputs must not replace one
+/// by accident (`render amphora.obj -o amphora.png`).
 
-/// From now on such files are remembered, and OutputFile::create() refuses their names. For
+/// From now on such files are remembered, and OutputFile and OutputFolder refuse their names. For
 /// programs that end with their job; a library's caller may replace a file that it has read.
 void guardNamedFiles();
 
-/// Called for each file that is found by a name in another (resolveInside()). From any thread.
+/// Called for each file that is found by a name in another (resolveInside()), in a folder or by a
+/// pattern, whose files may be folders. From any thread.
 void rememberNamedFile(const std::filesystem::path& file);
 
-/// Errors (usage) where the file that would be replaced is one that an input names.
+/// Errors (usage) where the file or folder that would be replaced is one that an input names.
 [[nodiscard]] Result<void> checkIsNotNamed(const std::filesystem::path& target);
 
 }  // namespace stx

@@ -1,6 +1,8 @@
 #include "formats/imagesets/camera_file.hpp"
 
+#include "formats/files/files.hpp"
 #include "formats/files/messages.hpp"
+#include "formats/files/named_files.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "lib/base/counted.hpp"
 
@@ -81,6 +83,15 @@ Result<std::vector<imagesets::SetView>> cameraPathInWorld(const imagesets::Json&
     return views;
 }
 
+/// Remembers the files beside the camera file that texts in it name, whatever their keys: pictures,
+/// which are not read here.
+void rememberNames(const imagesets::Json& value, const std::filesystem::path& folder) {
+    if (value.is_string())
+        rememberNamedFile(folder / imagesets::withImageEnding(folder, value.get<std::string>()));
+    else if (value.is_structured())
+        for (const imagesets::Json& part : value) rememberNames(part, folder);
+}
+
 }  // namespace
 
 Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path, Job& job,
@@ -95,6 +106,7 @@ Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& pat
         return camerasOf(views, where, job, size);
     }
     STX_TRY(const Json file, readJson(path, job.limits));
+    rememberNames(file, folderOf(path));
     Result<std::vector<SetView>> views =
         fail(ErrorCode::invalidInput,
              "a list 'frames' (transforms.json), 'cameras' (MIV, cameras.json) or 'camera_path' "

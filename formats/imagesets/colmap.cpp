@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "formats/files/messages.hpp"
+#include "formats/files/named_files.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/poses.hpp"
 #include "formats/imagesets/text_lines.hpp"
@@ -295,11 +296,11 @@ Result<Model3d> readModel(const path& given, const Limits& limits) {
         return failAt(inQuotes(given.string()), ErrorCode::invalidInput,
                       "no COLMAP model was found in it; sparse/cameras.bin and images.bin, or "
                       ".txt, are expected (colmap writes them with its mapper or model_converter)");
-    STX_TRY(const auto cameraBytes, readFile(m.file("cameras"), limits));
+    STX_TRY(const auto cameraBytes, readSetFile(m.file("cameras"), limits));
     STX_TRY(m.cameras, within(inQuotes(m.file("cameras").string()),
                               parseColmapCameras(cameraBytes, m.binary, limits)));
     m.ours = textOf(cameraBytes).starts_with(kWrittenByUs);
-    STX_TRY(const auto imageBytes, readFile(m.file("images"), limits));
+    STX_TRY(const auto imageBytes, readSetFile(m.file("images"), limits));
     STX_TRY(m.images, within(inQuotes(m.file("images").string()),
                              parseColmapImages(imageBytes, m.binary, limits)));
     return m;
@@ -344,6 +345,7 @@ Result<std::vector<SetView>> colmapViews(const path& given, Job& job) {
     std::vector<SetView> views;
     for (const ColmapImage& image : m.images) {
         STX_TRY(auto view, viewOf(m, image, placeOf(m, image)));
+        rememberNamedFile(m.base / "images" / image.name);
         views.push_back(std::move(view));
     }
     // The file's order is that of the numbers that COLMAP gave; people expect that of the names.

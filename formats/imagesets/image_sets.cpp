@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "formats/files/messages.hpp"
+#include "formats/files/named_files.hpp"
 #include "formats/files/not_there.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/motion.hpp"
@@ -58,6 +59,11 @@ Result<SetDescription> describeFiles(const path& path, const ImageSetOptions& op
         return fail(ErrorCode::usage, "'{}' is not a kind of image set; known are {}", kind, known);
     }
     STX_TRY(auto set, entry->describe(path, options, job));
+    // Some kinds find their pictures in folders, not by names. A file that is given may be
+    // replaced.
+    for (const SetView& view : set.views)
+        for (const PictureSource* source : {&view.texture, &view.depth, &view.mask})
+            if (source->path != path) rememberNamedFile(source->path);
     // Behind what is wrong with the set: one that lacks files may be taken for another kind.
     STX_CHECK(checkOptionsOf(kind, options, inQuotes(path.string()), job));
     return set;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "formats/files/messages.hpp"
+#include "formats/files/named_files.hpp"
 
 namespace stx::imagesets {
 
@@ -25,8 +26,13 @@ JsonKind jsonKindOf(const Json& file) {
 }
 
 Result<Json> readJson(const path& file, const Limits& limits) {
-    STX_TRY(const auto bytes, readFile(file, limits));
+    STX_TRY(const auto bytes, readSetFile(file, limits));
     return within(inQuotes(file.string()), parseJson(bytes));
+}
+
+Result<Bytes> readSetFile(const path& file, const Limits& limits) {
+    rememberNamedFile(file);
+    return readFile(file, limits);
 }
 
 Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& view) {

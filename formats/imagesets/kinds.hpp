@@ -54,6 +54,8 @@ enum class JsonKind { transforms, miv, cameras, cameraPath, none };
 [[nodiscard]] JsonKind jsonKindOf(const Json& file);
 /// Reads and parses a JSON file; errors name it.
 [[nodiscard]] Result<Json> readJson(const path& file, const Limits& limits);
+/// A file of a set that says where its cameras or pictures are; no output takes its place.
+[[nodiscard]] Result<Bytes> readSetFile(const path& file, const Limits& limits);
 
 /// The views of a JSON's cameras without their images, in the file's order.
 [[nodiscard]] Result<std::vector<SetView>> transformsViews(const Json& file, Job& job);

@@ -44,7 +44,7 @@ Camera cameraAt(double x, double f, double cx, double cy, int width, int height)
 Result<SetDescription> describeCalibrated(const path& file, Job& job) {
     const path folder = folderOf(file);
     const std::string where = inQuotes(file.string());
-    STX_TRY(const auto bytes, readFile(file, job.limits));
+    STX_TRY(const auto bytes, readSetFile(file, job.limits));
     STX_TRY(const auto calibration, within(where, parseMiddlebury(textOf(bytes), job.limits)));
     SetDescription set;
     for (int i = 0; i < 2; ++i) {
@@ -118,7 +118,7 @@ Result<SetDescription> describeOlder(const path& folder, const ImageSetOptions& 
     double offset = options.disparityOffset;
     std::error_code ec;
     if (offset == 0 && std::filesystem::is_regular_file(folder / "dmin.txt", ec)) {
-        STX_TRY(const auto bytes, readFile(folder / "dmin.txt", job.limits));
+        STX_TRY(const auto bytes, readSetFile(folder / "dmin.txt", job.limits));
         const auto lines = linesOf(textOf(bytes));
         const std::string place = inQuotes((folder / "dmin.txt").string());
         if (lines.empty()) return failAt(place, ErrorCode::invalidInput, "the file is empty");

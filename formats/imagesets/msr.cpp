@@ -163,7 +163,7 @@ Result<SetDescription> describeMsr(const path& given, const ImageSetOptions& opt
         return failAt(where, ErrorCode::usage,
                       "these sets do not tell what their depth means; give it with --depth-range "
                       "MIN,MAX (Breakdancers: 44,120, Ballet: 42,130)");
-    STX_TRY(const auto bytes, readFile(file, job.limits));
+    STX_TRY(const auto bytes, readSetFile(file, job.limits));
     STX_TRY(const auto cameras, within(where, parseMsrCalibration(textOf(bytes), job.limits)));
 
     SetDescription set;

@@ -102,7 +102,7 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
                       "no trajectory was found in it; trajectory.log, odometry.log or *-traj.txt "
                       "is expected");
     const std::string logWhere = inQuotes((folder / log).string());
-    STX_TRY(const auto bytes, readFile(folder / log, job.limits));
+    STX_TRY(const auto bytes, readSetFile(folder / log, job.limits));
     STX_TRY(const auto poses, within(logWhere, parseLog(textOf(bytes))));
     const auto lost = std::ranges::count(poses, true, &LoggedPose::lost);
     STX_CHECK(

@@ -67,7 +67,7 @@ struct TimedName {
 };
 
 Result<std::vector<TimedName>> readList(const path& folder, const std::string& file, Job& job) {
-    STX_TRY(const auto bytes, readFile(folder / file, job.limits));
+    STX_TRY(const auto bytes, readSetFile(folder / file, job.limits));
     const std::string where = inQuotes((folder / file).string());
     std::vector<TimedName> out;
     for (const TextLine& line : linesOf(textOf(bytes))) {
@@ -140,7 +140,7 @@ std::vector<Frame> associate(const std::vector<TimedName>& colours,
 
 Result<std::vector<TimedPose>> readTrajectory(const path& folder, const std::string& file,
                                               bool strict, Job& job) {
-    STX_TRY(const auto bytes, readFile(folder / file, job.limits));
+    STX_TRY(const auto bytes, readSetFile(folder / file, job.limits));
     const std::string where = inQuotes((folder / file).string());
     STX_TRY(auto poses, within(where, parseTrajectory(textOf(bytes))));
     const auto lost = std::ranges::count(poses, true, &TimedPose::lost);
@@ -195,7 +195,7 @@ Result<std::vector<Frame>> framesByTime(const path& folder, const std::string& t
     const std::string list =
         firstThere(folder, {"associations.txt", "associate.txt", "associated.txt"});
     if (!list.empty()) {
-        STX_TRY(const auto bytes, readFile(folder / list, job.limits));
+        STX_TRY(const auto bytes, readSetFile(folder / list, job.limits));
         const std::string where = inQuotes((folder / list).string());
         for (const TextLine& line : linesOf(textOf(bytes))) {
             const auto words = line.words();

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "formats/files/messages.hpp"
+#include "formats/imagesets/kinds.hpp"
 #include "lib/base/whole_number.hpp"
 
 namespace stx::imagesets {
@@ -59,7 +60,7 @@ Result<std::vector<double>> numbersOf(const std::vector<std::string_view>& words
 
 Result<std::vector<double>> numbersIn(const std::filesystem::path& file, const Limits& limits,
                                       std::size_t most, Numbers which) {
-    STX_TRY(const auto bytes, readFile(file, limits));
+    STX_TRY(const auto bytes, readSetFile(file, limits));
     const std::string where = inQuotes(file.string());
     std::vector<double> out;
     for (const TextLine& line : linesOf(textOf(bytes))) {

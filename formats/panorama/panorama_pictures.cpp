@@ -2,6 +2,7 @@
 #include <mutex>
 
 #include "formats/files/messages.hpp"
+#include "formats/files/named_files.hpp"
 #include "formats/images/exif.hpp"
 #include "formats/images/images.hpp"
 #include "formats/panorama/panorama_files.hpp"
@@ -96,6 +97,7 @@ Result<std::unique_ptr<PictureSource>> openPanoramaPictures(const std::vector<fs
                         "'{}' is a folder; of several inputs each must be a picture (give it "
                         "alone)",
                         file.string());
+    for (const fs::path& file : files) rememberNamedFile(file);
     auto source = std::make_unique<PictureFiles>(std::move(files), job);
     STX_CHECK(source->open());
     return source;

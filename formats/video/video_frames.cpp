@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "formats/files/messages.hpp"
+#include "formats/files/named_files.hpp"
 #include "formats/files/not_there.hpp"
 #include "formats/images/images.hpp"
 #include "formats/video/film.hpp"
@@ -222,6 +223,9 @@ std::string headOfFile(const fs::path& path) {
 
 Result<std::unique_ptr<VideoFrames>> openPictures(std::vector<fs::path> files, std::string what,
                                                   bool strict, Job& job) {
+    // Those of a folder, and those that a mask named after its frame ('{stem}.png') would replace.
+    if (files.size() > 1)
+        for (const fs::path& file : files) rememberNamedFile(file);
     auto frames = std::make_unique<PictureFrames>(std::move(files), std::move(what), job);
     STX_CHECK(frames->open(strict));
     return frames;
