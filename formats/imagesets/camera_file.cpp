@@ -83,13 +83,19 @@ Result<std::vector<imagesets::SetView>> cameraPathInWorld(const imagesets::Json&
     return views;
 }
 
-/// Remembers the files beside the camera file that texts in it name, whatever their keys: pictures,
-/// which are not read here.
-void rememberNames(const imagesets::Json& value, const std::filesystem::path& folder) {
-    if (value.is_string())
-        rememberNamedFile(folder / imagesets::withImageEnding(folder, value.get<std::string>()));
-    else if (value.is_structured())
-        for (const imagesets::Json& part : value) rememberNames(part, folder);
+/// Remembers the pictures that a camera file names (`file_path`, `depth_file_path`, `mask_path` of
+/// transforms.json), which are not read here. Names of cameras are none: what was drawn for them
+/// may be drawn again.
+void rememberPictures(const imagesets::Json& value, const std::filesystem::path& folder) {
+    if (value.is_array())
+        for (const imagesets::Json& part : value) rememberPictures(part, folder);
+    if (!value.is_object()) return;
+    for (const auto& [key, part] : value.items()) {
+        if (part.is_string() && key.ends_with("_path"))
+            rememberNamedFile(folder / imagesets::withImageEnding(folder, part));
+        else
+            rememberPictures(part, folder);
+    }
 }
 
 }  // namespace
@@ -106,7 +112,7 @@ Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& pat
         return camerasOf(views, where, job, size);
     }
     STX_TRY(const Json file, readJson(path, job.limits));
-    rememberNames(file, folderOf(path));
+    rememberPictures(file, folderOf(path));
     Result<std::vector<SetView>> views =
         fail(ErrorCode::invalidInput,
              "a list 'frames' (transforms.json), 'cameras' (MIV, cameras.json) or 'camera_path' "

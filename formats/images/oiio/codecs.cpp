@@ -152,7 +152,7 @@ decoders::PictureFacts factsOf(const OIIO::ImageSpec& spec, const std::string& f
 /// White is 0 in a TIFF of PhotometricInterpretation 0 (TIFF 6.0, section 4): its first sample is
 /// white less the value, those beside it (ExtraSamples) are themselves. The library turns all of
 /// them when they have up to 8 bits, and none when they have more.
-void turnWhiteIsZero(const OIIO::ImageSpec& spec, OIIO::TypeDesc type, void* values) {
+void turnWhiteIsZero(const OIIO::ImageSpec& spec, const OIIO::TypeDesc& type, void* values) {
     constexpr int kWhiteIsZero = 0;
     if (spec.get_int_attribute("tiff:PhotometricInterpretation", -1) != kWhiteIsZero) return;
     const std::size_t samples = static_cast<std::size_t>(spec.nchannels);
