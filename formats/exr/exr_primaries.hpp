@@ -13,7 +13,7 @@ struct Primaries {
 
 /// What linear R, G, B of these primaries are multiplied with to be of Rec. 709, white to white:
 /// through the CIE XYZ of both (SMPTE RP 177), adapted by Bradford's matrix (Lam 1985) where the
-/// whites differ. Empty where the white is no mix of the primaries.
+/// whites differ. Empty where no mix of the primaries gives the white.
 [[nodiscard]] std::optional<glm::dmat3> rec709From(const Primaries& primaries);
 
 }  // namespace stx

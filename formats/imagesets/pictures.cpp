@@ -202,15 +202,14 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
     STX_TRY(auto image, decode(source, bytes, job));
     out.alpha = image.channelNames.empty() ? image.channels == 2 || image.channels == 4
                                            : channelIn(image, "A") >= 0;
-    if (image.bits() == 16 && deep) {
-        out.texture = linearFromCoded(photos::srgbFloatFrom(image, bytes, colours));
-        if (!colours.empty()) job.note(colours);
-        return out;
-    }
     if (image.bits() < 32) {
-        if (image.bits() == 16)
-            job.note("colour of 16 bits is rounded to 8; stx convert -o NAME.exr keeps it");
-        out.texture = photos::srgb8From(image, bytes, colours);
+        if (image.bits() == 16 && deep) {
+            out.texture = linearFromCoded(photos::srgbFloatFrom(image, bytes, colours));
+        } else {
+            if (image.bits() == 16)
+                job.note("colour of 16 bits is rounded to 8; stx convert -o NAME.exr keeps it");
+            out.texture = photos::srgb8From(image, bytes, colours);
+        }
         if (!colours.empty()) job.note(colours);
         return out;
     }

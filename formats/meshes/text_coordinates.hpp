@@ -17,7 +17,7 @@ struct PlainText {
 
 /// OBJ text in which the numbers of `v`, `vt`, `vn` have a digit before their point: `.5`, which
 /// Wavefront's specification allows, becomes `0.5`, since Assimp counts words that begin with a
-/// digit or a sign only. Nothing when there is no such number.
+/// digit or a sign only. Nothing when all numbers have one.
 [[nodiscard]] std::optional<Bytes> withLeadingZeros(ByteSpan text);
 
 /// Rewrites the lines that begin with `keyword` ("v" of OBJ, "vertex" of STL) where Assimp would

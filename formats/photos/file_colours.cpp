@@ -153,7 +153,7 @@ FileColours coloursOfPng(ByteSpan file) {
     }
     if (srgb || (gama.empty() && chrm.empty())) return {};
     constexpr double kUnit = 100000;
-    constexpr std::uint32_t kSrgbGamma = 45455;  // what stands for sRGB's curve (11.3.2.3)
+    constexpr std::uint32_t kSrgbGamma = 45455;  // it means sRGB's curve (11.3.2.3)
     Curve curve;
     if (!gama.empty()) {
         const std::uint32_t gamma = bigEndian(gama, 0, 4);

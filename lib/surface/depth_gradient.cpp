@@ -218,8 +218,9 @@ void link(const ReferenceView& view, double discontinuity, DepthSurface& surface
         };
         const double before = misses(x - dx, y - dy, x, y);
         const double after = misses(qx, qy, qx + dx, qy + dy);
-        if (std::abs(d) <= kSteep * limit) return before <= limit || after <= limit;
-        return !(before > limit) && !(after > limit) && (before <= limit || after <= limit);
+        const bool steep = std::abs(d) > kSteep * limit;
+        if (steep && (before > limit || after > limit)) return false;
+        return before <= limit || after <= limit;
     };
     parallelFor(0, height, kRowsPerTask, [&](int y) {
         for (int x = 0; x < width; ++x) {
