@@ -40,25 +40,38 @@ double stepAt(const PageSet& set, std::size_t view, int u, int v) {
     return spacingAt(set.views()[view].camera, found) + std::max(rise(1, 0), rise(0, 1));
 }
 
-/// Whether a view shows the surface of a point, which another sees along `sight` with samples
-/// `step` apart, as finely in every direction.
-bool showsFinely(const PageSet& set, std::size_t view, glm::dvec3 point, glm::dvec3 sight,
-                 double step) {
+/// A sample of a coarse view: samples beside it are `spacing` apart, and `step` on its surface.
+struct CoarseSample {
+    glm::dvec3 point;
+    glm::dvec3 sight;  // unit
+    double spacing;    // scene units, as the next
+    double step;
+};
+
+/// Whether a view shows the surface of a sample as finely in every direction.
+bool showsFinely(const PageSet& set, std::size_t view, const CoarseSample& sample) {
     const Camera& camera = set.views()[view].camera;
-    const glm::dvec3 inCamera = glm::conjugate(camera.orientation) * (point - camera.position);
+    const glm::dvec3 inCamera =
+        glm::conjugate(camera.orientation) * (sample.point - camera.position);
     // From the other side a thin sheet looks otherwise.
-    if (!(inCamera.z < 0) || !(glm::dot(sightOf(camera, point), sight) > 0)) return false;
+    if (!(inCamera.z < 0) || !(glm::dot(sightOf(camera, sample.point), sample.sight) > 0))
+        return false;
     const glm::dvec3 pixel = camera.project(inCamera);
     const int u = static_cast<int>(std::floor(pixel.x)), v = static_cast<int>(std::floor(pixel.y));
     if (!(u >= 0 && v >= 0 && u < camera.width && v < camera.height)) return false;
-    // The pixel itself, or one beside it: at an outline it is covered in part, or beyond it.
+    // The pixel itself, or one beside it that is within the sample's half pixel: at an outline it
+    // is covered in part, or beyond it.
     for (int k = 0; k < 9; ++k) {
         const int x = u + (k + 4) % 9 % 3 - 1, y = v + (k + 4) % 9 / 3 - 1;
         if (!(x > 0 && y > 0 && x < camera.width - 1 && y < camera.height - 1)) continue;
         const PageRectangle* r = set.find(view, x, y);
         if (!r || set.pages()[r->page].texture->alpha(r->texel(x, y)) < 1.0f) continue;
         const double found = set.depth(view, x, y), own = stepAt(set, view, x, y);
-        if (std::abs(found - pixel.z) <= kShownDepth * pixel.z + own && own <= step) return true;
+        if (!(std::abs(found - pixel.z) <= kShownDepth * pixel.z + own) || own > sample.step)
+            continue;
+        const glm::dvec3 shown =
+            camera.position + camera.orientation * camera.unproject(x + 0.5, y + 0.5, found);
+        if (k == 0 || glm::distance(shown, sample.point) <= 0.5 * sample.spacing) return true;
     }
     return false;
 }
@@ -98,10 +111,11 @@ PageSet PageSet::withoutCoarse(std::int64_t& points) const {
                         camera.position +
                         camera.orientation * camera.unproject(x + 0.5, y + 0.5, z);
                     const double climbs = stepAt(*this, view, x, y);
-                    const double step = std::isfinite(climbs) ? climbs : spacingAt(camera, z);
-                    needless.at(x, y) = std::ranges::any_of(finer, [&](std::size_t k) {
-                        return showsFinely(*this, k, point, sightOf(camera, point), step);
-                    });
+                    const double spacing = spacingAt(camera, z);
+                    const CoarseSample sample{point, sightOf(camera, point), spacing,
+                                              std::isfinite(climbs) ? climbs : spacing};
+                    needless.at(x, y) = std::ranges::any_of(
+                        finer, [&](std::size_t k) { return showsFinely(*this, k, sample); });
                     if (!needless.at(x, y)) all = false;
                 }
             }
