@@ -40,38 +40,45 @@ double stepAt(const PageSet& set, std::size_t view, int u, int v) {
     return spacingAt(set.views()[view].camera, found) + std::max(rise(1, 0), rise(0, 1));
 }
 
-/// A sample of a coarse view: samples beside it are `spacing` apart, and `step` on its surface.
-struct CoarseSample {
-    glm::dvec3 point;
-    glm::dvec3 sight;  // unit
-    double spacing;    // scene units, as the next
-    double step;
+/// A pixel of a coarse view.
+struct CoarsePixel {
+    const Camera& camera;
+    glm::dvec3 centre;  // of what it shows
+    double step;        // from there to its neighbours, scene units
+
+    [[nodiscard]] glm::dvec2 place(glm::dvec3 point) const {
+        return camera.project(glm::conjugate(camera.orientation) * (point - camera.position));
+    }
+    [[nodiscard]] bool holds(glm::dvec3 point) const {
+        return glm::all(
+            glm::lessThanEqual(glm::abs(place(point) - place(centre)), glm::dvec2(0.5)));
+    }
 };
 
-/// Whether a view shows the surface of a sample as finely in every direction.
-bool showsFinely(const PageSet& set, std::size_t view, const CoarseSample& sample) {
+/// Whether a view shows the surface of a pixel as finely in every direction.
+bool showsFinely(const PageSet& set, std::size_t view, const CoarsePixel& coarse) {
     const Camera& camera = set.views()[view].camera;
     const glm::dvec3 inCamera =
-        glm::conjugate(camera.orientation) * (sample.point - camera.position);
+        glm::conjugate(camera.orientation) * (coarse.centre - camera.position);
     // From the other side a thin sheet looks otherwise.
-    if (!(inCamera.z < 0) || !(glm::dot(sightOf(camera, sample.point), sample.sight) > 0))
+    if (!(inCamera.z < 0) ||
+        !(glm::dot(sightOf(camera, coarse.centre), sightOf(coarse.camera, coarse.centre)) > 0))
         return false;
     const glm::dvec3 pixel = camera.project(inCamera);
     const int u = static_cast<int>(std::floor(pixel.x)), v = static_cast<int>(std::floor(pixel.y));
     if (!(u >= 0 && v >= 0 && u < camera.width && v < camera.height)) return false;
-    // The pixel itself, or one beside it that is within the sample's half pixel: at an outline it
-    // is covered in part, or beyond it.
-    for (int k = 0; k < 9; ++k) {
-        const int x = u + (k + 4) % 9 % 3 - 1, y = v + (k + 4) % 9 / 3 - 1;
-        if (!(x > 0 && y > 0 && x < camera.width - 1 && y < camera.height - 1)) continue;
-        const PageRectangle* r = set.find(view, x, y);
-        if (!r || set.pages()[r->page].texture->alpha(r->texel(x, y)) < 1.0f) continue;
-        const double found = set.depth(view, x, y), own = stepAt(set, view, x, y);
-        if (!(std::abs(found - pixel.z) <= kShownDepth * pixel.z + own) || own > sample.step)
-            continue;
-        const glm::dvec3 shown =
-            camera.position + camera.orientation * camera.unproject(x + 0.5, y + 0.5, found);
-        if (k == 0 || glm::distance(shown, sample.point) <= 0.5 * sample.spacing) return true;
+    // The pixel itself, or one beside it that shows a place in the coarse one: at an outline the
+    // pixel is covered in part, or beyond it.
+    for (int y = std::max(v - 1, 1); y <= std::min(v + 1, camera.height - 2); ++y) {
+        for (int x = std::max(u - 1, 1); x <= std::min(u + 1, camera.width - 2); ++x) {
+            const PageRectangle* r = set.find(view, x, y);
+            if (!r || set.pages()[r->page].texture->alpha(r->texel(x, y)) < 1.0f) continue;
+            const double found = set.depth(view, x, y), own = stepAt(set, view, x, y);
+            if (std::abs(found - pixel.z) <= kShownDepth * pixel.z + own && own <= coarse.step &&
+                coarse.holds(camera.position +
+                             camera.orientation * camera.unproject(x + 0.5, y + 0.5, found)))
+                return true;
+        }
     }
     return false;
 }
@@ -111,11 +118,10 @@ PageSet PageSet::withoutCoarse(std::int64_t& points) const {
                         camera.position +
                         camera.orientation * camera.unproject(x + 0.5, y + 0.5, z);
                     const double climbs = stepAt(*this, view, x, y);
-                    const double spacing = spacingAt(camera, z);
-                    const CoarseSample sample{point, sightOf(camera, point), spacing,
-                                              std::isfinite(climbs) ? climbs : spacing};
+                    const CoarsePixel pixel{camera, point,
+                                            std::isfinite(climbs) ? climbs : spacingAt(camera, z)};
                     needless.at(x, y) = std::ranges::any_of(
-                        finer, [&](std::size_t k) { return showsFinely(*this, k, sample); });
+                        finer, [&](std::size_t k) { return showsFinely(*this, k, pixel); });
                     if (!needless.at(x, y)) all = false;
                 }
             }
