@@ -111,7 +111,7 @@ Result<void> checkPaths(const CLI::App& app, const PathOptions& paths) {
     for (const auto* option : paths.outputs)
         addNamedPaths(*option, option == paths.replacing, outputs);
     STX_CHECK(checkOutputNames(outputs, inputs));
-    rememberNumberedInputs(outputs, inputs);
+    rememberNumberedInputs(inputs);
     for (const NamedPath& output : outputs) {
         if (output.option != "--report") continue;
         STX_CHECK(checkReportName(output.path));

@@ -410,6 +410,7 @@ Result<int> packInput(const PackOptions& options, Program& program) {
     const auto length = static_cast<std::size_t>(o.period);
     for (std::size_t i = 0; i < count; i += length)
         STX_CHECK(packPeriod(o, *frames, i, std::min(count, i + length), program));
+    noteOlderFiles(o.output, count, program.job);
     return 0;
 }
 

@@ -20,6 +20,12 @@ fs::path wholePath(const std::string& path) {
     return whole.has_filename() || !whole.has_relative_path() ? whole : whole.parent_path();
 }
 
+/// Whether it names a film of numbered files: a file may have such a name itself.
+bool isNumberedFilm(const std::string& path) {
+    std::error_code ec;
+    return frameName(path, 0) && !fs::exists(path, ec);
+}
+
 /// "-o 'b.exr' is the input 'a.exr'".
 std::string clash(const NamedPath& output, const NamedPath& input) {
     return fmt::format("{} '{}' is {} '{}'", output.option, output.path,
@@ -51,7 +57,8 @@ Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
                         output->option, output->path, other->option, other->path);
         }
         for (const NamedPath& input : inputs) {
-            const bool itself = output->replaces && input.option.empty() && alone == 1;
+            const bool itself = output->replaces && input.option.empty() && alone == 1 &&
+                                !isNumberedFilm(input.path);
             if (!itself && samePath(output->path, input.path))
                 return fail(ErrorCode::usage, "{}, which would be lost; give it another name",
                             clash(*output, input));
@@ -60,16 +67,9 @@ Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
     return {};
 }
 
-void rememberNumberedInputs(const std::vector<NamedPath>& outputs,
-                            const std::vector<NamedPath>& inputs) {
+void rememberNumberedInputs(const std::vector<NamedPath>& inputs) {
     for (const NamedPath& input : inputs) {
-        std::error_code ec;
-        // A file may have such a name itself.
-        if (!frameName(input.path, 0) || fs::exists(input.path, ec)) continue;
-        const bool replaced = std::ranges::any_of(outputs, [&](const NamedPath& output) {
-            return output.replaces && samePath(output.path, input.path);
-        });
-        if (replaced) continue;
+        if (!isNumberedFilm(input.path)) continue;
         // Where none is there, opening the input says so.
         if (const auto files = numberedFiles(input.path))
             for (const NumberedFile& file : *files) rememberNamedFile(file.path);

@@ -12,7 +12,8 @@ namespace stx::tools {
 struct NamedPath {
     std::string option;  ///< "-o"; empty of an input that stands alone
     std::string path;    ///< "-" is a standard stream, and no file
-    /// Of an output: may take the place of the input, where that is the only one.
+    /// Of an output: may take the place of the input, where that is the only one, and one file or
+    /// folder: the files of a numbered film change one by one, and are others where it is cut.
     bool replaces = false;
 };
 
@@ -25,10 +26,8 @@ struct NamedPath {
 [[nodiscard]] Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
                                             const std::vector<NamedPath>& inputs);
 
-/// Remembers the files of numbered inputs (`name_%04d.png`) as files that an input names, but for a
-/// sequence that an output replaces: its files are renamed into their places one by one.
-void rememberNumberedInputs(const std::vector<NamedPath>& outputs,
-                            const std::vector<NamedPath>& inputs);
+/// Remembers the files of numbered inputs (`name_%04d.png`) as files that an input names.
+void rememberNumberedInputs(const std::vector<NamedPath>& inputs);
 
 /// Error (usage) where a report would be the main file of a folder that is an input or an output:
 /// an atlas' atlas.json, a set's transforms.json, cameras.json or files of COLMAP. It would be

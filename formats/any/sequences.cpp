@@ -234,6 +234,7 @@ Result<void> saveSequence(Sequence& frames, const fs::path& target, const SaveOp
             STX_CHECK(
                 saveViews(*table, *frameName(target.string(), static_cast<int>(i)), each, job));
         }
+        noteOlderFiles(target.string(), count, job);
         return {};
     }
     if (count == 1) {

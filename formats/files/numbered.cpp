@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "formats/files/files.hpp"
+#include "lib/base/counted.hpp"
 #include "lib/base/whole_number.hpp"
 
 namespace stx {
@@ -91,6 +92,19 @@ Result<std::vector<NumberedFile>> numberedFiles(const std::string& pattern) {
                     pattern);
     std::ranges::sort(files, {}, &NumberedFile::number);
     return files;
+}
+
+void noteOlderFiles(const std::string& pattern, std::size_t count, Job& job) {
+    const auto files = numberedFiles(pattern);
+    if (!files) return;
+    const auto first = std::ranges::find_if(*files, [&](const NumberedFile& file) {
+        return file.number >= static_cast<std::int64_t>(count);
+    });
+    if (first == files->end()) return;
+    job.note(fmt::format("'{}' has {} from before, '{}' the first: they are not of the {} just "
+                         "written, but are read with them; remove them, or give another name",
+                         pattern, counted(static_cast<std::size_t>(files->end() - first), "file"),
+                         first->path.string(), counted(count, "frame")));
 }
 
 std::optional<std::int64_t> firstMissing(const std::vector<NumberedFile>& files) {

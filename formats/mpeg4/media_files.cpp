@@ -343,7 +343,8 @@ std::string mediaFolderName(const std::filesystem::path& text) {
             at += bytes;
         }
     }
-    return name + "_images";
+    const std::string ending = text.extension().string();
+    return name + (equalNoCase(ending, ".xmt") ? "_images" : "_images_" + ending.substr(1));
 }
 
 }  // namespace stx::mpeg4

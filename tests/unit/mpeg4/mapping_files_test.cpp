@@ -68,12 +68,17 @@ TEST(Mpeg4Files, TextsOfAnyNameAreReadBack) {
 }
 
 TEST(Mpeg4Files, FoldersOfImagesDifferWhereTextsDo) {
-    EXPECT_EQ(mediaFolderName("c/a.v2.bt"), "a.v2_images");
-    EXPECT_EQ(mediaFolderName("t=0.5 \xc3\xbc.bt"), "t=0.5 \xc3\xbc_images");
-    EXPECT_EQ(mediaFolderName("a#1.bt"), "a=231_images");
-    EXPECT_EQ(mediaFolderName("a=231.bt"), "a=3D231_images");
-    EXPECT_EQ(mediaFolderName("50%.bt"), "50=25_images");
-    EXPECT_EQ(mediaFolderName("a:\n\xff.bt"), "a=3A=0A=FF_images");
+    EXPECT_EQ(mediaFolderName("c/a.v2.bt"), "a.v2_images_bt");
+    EXPECT_EQ(mediaFolderName("t=0.5 \xc3\xbc.bt"), "t=0.5 \xc3\xbc_images_bt");
+    EXPECT_EQ(mediaFolderName("a#1.bt"), "a=231_images_bt");
+    EXPECT_EQ(mediaFolderName("a=231.bt"), "a=3D231_images_bt");
+    EXPECT_EQ(mediaFolderName("50%.bt"), "50=25_images_bt");
+    EXPECT_EQ(mediaFolderName("a:\n\xff.bt"), "a=3A=0A=FF_images_bt");
+    // Two texts of one name, and names that end like another's folder.
+    EXPECT_EQ(mediaFolderName("a.xmt"), "a_images");
+    EXPECT_EQ(mediaFolderName("a.XMT"), "a_images");
+    EXPECT_EQ(mediaFolderName("a.xmta"), "a_images_xmta");
+    EXPECT_EQ(mediaFolderName("a_images_bt.xmt"), "a_images_bt_images");
 }
 
 TEST(Mpeg4Files, Mp4ThroughATextIsTheSameFile) {
@@ -129,9 +134,9 @@ TEST(Mpeg4Files, StreamsOfSeveralPicturesSurviveTheTexts) {
         // Named as other programs name a track, too.
         const Bytes text = bytesOfFile(folder / name);
         EXPECT_NE(std::string_view(reinterpret_cast<const char*>(text.data()), text.size())
-                      .find("a_images/view1_texture.mp4#1\""),
+                      .find(mediaFolderName(name) + "/view1_texture.mp4#1\""),
                   std::string_view::npos);
-        EXPECT_TRUE(fs::exists(folder / "a_images" / "view1_texture.mp4"));
+        EXPECT_TRUE(fs::exists(folder / mediaFolderName(name) / "view1_texture.mp4"));
         const auto back = readMpeg4(folder / name, job);
         ASSERT_TRUE(back) << back.error().text();
         const auto& again = back->findObjectDescriptor(ods[0].id)->streams.at(0);
@@ -146,7 +151,7 @@ TEST(Mpeg4Files, StreamsOfSeveralPicturesSurviveTheTexts) {
     stream.samples[1].duration = 3001;
     stream.samples[2].time = 6001;
     mustWrite(writeMpeg4(*scene, folder / "b.bt", job));
-    EXPECT_TRUE(fs::exists(folder / "b_images" / "view1_texture.mp4"));
+    EXPECT_TRUE(fs::exists(folder / "b_images_bt" / "view1_texture.mp4"));
     const auto back = readMpeg4(folder / "b.bt", job);
     ASSERT_TRUE(back) << back.error().text();
     EXPECT_EQ(back->findObjectDescriptor(ods[0].id)->streams.at(0).samples.at(2).time, 6001u);
@@ -284,14 +289,14 @@ TEST(Mpeg4Files, WritingTwiceReplacesTextAndImages) {
     bundle.views.pop_back();
     bundle.views[0].name = "other";
     mustWrite(writeMpeg4Views(*viewsOf(bundle), folder / "a.bt", job));
-    EXPECT_FALSE(fs::exists(folder / "a_images" / "view2_texture.png"));
-    EXPECT_TRUE(fs::exists(folder / "a_images" / "other_texture.png"));
+    EXPECT_FALSE(fs::exists(folder / "a_images_bt" / "view2_texture.png"));
+    EXPECT_TRUE(fs::exists(folder / "a_images_bt" / "other_texture.png"));
     // A stranger's file in that folder is not an image of ours.
-    std::ofstream(folder / "a_images" / "letter.txt") << "dear";
+    std::ofstream(folder / "a_images_bt" / "letter.txt") << "dear";
     const auto refused = writeMpeg4Views(*viewsOf(bundle), folder / "a.bt", job);
     ASSERT_FALSE(refused);
     EXPECT_NE(refused.error().text().find("letter.txt"), std::string::npos);
-    EXPECT_TRUE(fs::exists(folder / "a_images" / "letter.txt"));
+    EXPECT_TRUE(fs::exists(folder / "a_images_bt" / "letter.txt"));
 }
 
 TEST(Mpeg4Files, ImageNamesStayInsideTheFolder) {
@@ -376,7 +381,6 @@ TEST_P(ReferenceMp4, IsTheSceneOfItsBtAndSurvivesTheTexts) {
         const auto bytes = writeMp4(*back, job);
         ASSERT_TRUE(bytes) << bytes.error().text();
         EXPECT_EQ(*bytes, *straight) << text;
-        fs::remove_all(folder / "a_images");
     }
 }
 
