@@ -31,8 +31,9 @@ void nameTracks(Document& document);
 [[nodiscard]] std::vector<std::string> mediaFileNames(const Document& document);
 
 /// The folder of these files, beside the text: `name_images` of `name.xmt`, `name_images_bt` of
-/// `name.bt`, and `name_images_xmta` of `name.xmta`. What readers of a file's name take for something else (`%` of numbers, `#` of a track, `:` of a URL), and bytes that XML
-/// cannot have, is `=` and two hexadecimal digits, so that two texts never share a folder.
+/// `name.bt`, and `name_images_xmta` of `name.xmta`. What readers of a file's name take for
+/// something else (`%` of numbers, `#` of a track, `:` of a URL), and bytes that XML cannot have,
+/// is `=` and two hexadecimal digits, so that two texts never share a folder.
 [[nodiscard]] std::string mediaFolderName(const std::filesystem::path& text);
 
 }  // namespace stx::mpeg4
