@@ -101,10 +101,11 @@ void noteOlderFiles(const std::string& pattern, std::size_t count, Job& job) {
         return file.number >= static_cast<std::int64_t>(count);
     });
     if (first == files->end()) return;
-    job.note(fmt::format("'{}' has {} from before, '{}' the first: they are not of the {} just "
-                         "written, but are read with them; remove them, or give another name",
-                         pattern, counted(static_cast<std::size_t>(files->end() - first), "file"),
-                         first->path.string(), counted(count, "frame")));
+    job.note(
+        fmt::format("'{}' has {} from before, '{}' the first: they are not of the {} just "
+                    "written, but are read with them; remove them, or give another name",
+                    pattern, counted(static_cast<std::size_t>(files->end() - first), "file"),
+                    first->path.string(), counted(count, "frame")));
 }
 
 std::optional<std::int64_t> firstMissing(const std::vector<NumberedFile>& files) {

@@ -31,8 +31,8 @@ struct NumberedFile {
 /// Numbers may count in steps: the least difference is the usual one.
 [[nodiscard]] std::optional<std::int64_t> firstMissing(const std::vector<NumberedFile>& files);
 
-/// Notes the files of a pattern that are not of the film just written, frames 0 to `count` - 1: they
-/// were there before, and whoever reads the film takes them for its end.
+/// Notes the files of a pattern that are not of the film just written, frames 0 to `count` - 1:
+/// they were there before, and whoever reads the film takes them for its end.
 void noteOlderFiles(const std::string& pattern, std::size_t count, Job& job);
 
 }  // namespace stx
