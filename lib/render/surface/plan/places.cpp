@@ -60,6 +60,26 @@ class Nearest {
     std::vector<float> q_;
 };
 
+/// Pixels of a block along one axis, `step` apart, and the first and the last of the picture: what
+/// it alone shows may end there, in a tile that has no other pixel of it.
+struct PixelsApart {
+    int end, first;
+
+    PixelsApart(int begin, int size, int step)
+        : end(std::min(kBlock, size - begin)),
+          first(begin == 0 ? 0 : std::min(step, end) / 2),
+          step_(step),
+          endsPicture_(begin + end == size) {}
+    [[nodiscard]] int after(int at) const {
+        const int next = at == 0 && step_ > 1 ? step_ / 2 : at + step_;
+        return endsPicture_ && next >= end ? std::max(at + 1, end - 1) : next;
+    }
+
+  private:
+    int step_;
+    bool endsPicture_;
+};
+
 /// The pixels of a source in a frame.
 class PlacesOf {
   public:
@@ -138,10 +158,9 @@ class PlacesOf {
     void visitPixels(const BlockTexels& texels, int x0, int y0, int step,
                      const Visit& visit) const {
         const Source& s = source_;
-        const int columns = std::min(kBlock, s.width - x0), rows = std::min(kBlock, s.height - y0);
-        // Blocks at the border of a picture may have fewer pixels than a step.
-        for (int j = std::min(step, rows) / 2; j < rows; j += step) {
-            for (int i = std::min(step, columns) / 2; i < columns; i += step) {
+        const PixelsApart columns(x0, s.width, step), rows(y0, s.height, step);
+        for (int j = rows.first; j < rows.end; j = rows.after(j)) {
+            for (int i = columns.first; i < columns.end; i = columns.after(i)) {
                 const std::ptrdiff_t texel = texels.at(i, j);
                 const float q = texels.q[texel];
                 if (!(q > 0)) continue;
