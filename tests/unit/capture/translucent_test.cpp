@@ -7,7 +7,7 @@ namespace stx {
 namespace {
 
 /// Squares of 8 x 8 that face +Z, each with a material of its own; materials[0] is the first's.
-Mesh squares(std::initializer_list<std::pair<float, glm::vec4>> heightAndColour) {
+Mesh squares(const std::vector<std::pair<float, glm::vec4>>& heightAndColour) {
     Mesh mesh;
     for (const auto& [z, colour] : heightAndColour) {
         const auto base = static_cast<std::uint32_t>(mesh.positions.size());
@@ -114,6 +114,21 @@ TEST(Translucent, OneHalfDoesNotSpeckleBesideVertexColours) {
             EXPECT_NEAR(image->colour.at(x, y).r, 0.5f, 1e-3f) << x << ' ' << y;
             EXPECT_LT(image->depth.at(x, y), 4.5f) << "the front surface at " << x << ' ' << y;
         }
+    }
+}
+
+/// Glass, leaves or smoke of many sheets, in any order of the file.
+TEST(Translucent, ManyLayersHideWhatTheyDoTogether) {
+    Job job;
+    for (const int count : {8, 9, 20, 60}) {
+        std::vector<std::pair<float, glm::vec4>> sheets{{-1.0f, withAlpha(kBlue, 0.95f)}};
+        for (int i = 0; i < count; ++i)
+            sheets.emplace_back(0.01f * static_cast<float>(i * 7 % count), withAlpha(kRed, 0.02f));
+        const auto image = rasterise(squares(sheets), above(), {}, job);
+        ASSERT_TRUE(image);
+        const double through = std::pow(0.98, count), red = 1 - through, blue = through * 0.95;
+        // Half is hidden by 35 sheets, else by what is behind them.
+        expectAll(*image, glm::vec4(red, 0, blue, red + blue), count > 35 ? 4.75f : 6.0f);
     }
 }
 
