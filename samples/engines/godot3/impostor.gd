@@ -34,6 +34,9 @@ func _ready():
 	assert(one.name == object or object == "")
 	var side = int(round(sqrt(one.views)))
 	assert(side * side == one.views and side > 2)
+	# Views that see nothing are left out by stx, and counted: view000, view001, ... All are needed.
+	var last = atlas.views[one.firstView + one.views - 1].name
+	assert(not last.begins_with("view") or int(last.substr(4)) == one.views - 1)
 	# Five texels for each view, see impostor.shader.
 	var table = Image.new()
 	table.create(5, side * side, false, Image.FORMAT_RGBAF)

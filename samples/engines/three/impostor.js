@@ -35,6 +35,10 @@ export async function loadImpostor(folder, name) {
     const side = Math.round(Math.sqrt(views.length)), {page} = rectangles[0];
     if (side * side !== views.length || side < 3 || rectangles.some((r) => r.page !== page))
         throw new Error(`${folder} has ${views.length} views; a grid of N x N on one page is expected`);
+    // stx leaves out views that see nothing, and counts them: view000, view001, ...
+    const missing = views.findIndex((v, i) => /^view\d+$/.test(v.name) && Number(v.name.slice(4)) !== i);
+    if (missing >= 0)
+        throw new Error(`${folder} has no view ${missing}, which sees nothing of the object; all N x N views are needed`);
     const table = new Float32Array(side * side * 20);
     for (const {view, atlasX, atlasY, width, height} of rectangles) {
         const v = atlas.views[view], [x, y, z, w] = v.quaternion;
