@@ -5,6 +5,7 @@
 
 #include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
+#include "formats/imagesets/no_depth.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/resample.hpp"
@@ -54,74 +55,6 @@ Result<Camera> cameraOfSize(const SetView& set, int width, int height) {
     if (auto ok = c.check(); !ok)
         return tl::unexpected(ok.error().at(fmt::format("camera '{}'", set.name)));
     return c;
-}
-
-/// Calls work(image, full) with the pixels of a texture and the alpha of what is covered in full.
-template <class Work>
-void withPixels(Texture& texture, const Work& work) {
-    if (auto* bytes = texture.rgba8())
-        work(*bytes, std::uint8_t{255});
-    else
-        work(*texture.rgbaFloat(), 1.0f);
-}
-
-/// Where there is no point there is no object, unless its distance may be unknown. Partly covered
-/// pixels of the set's own alpha stay: they are the silhouette of points beside them.
-void coverOnlyPoints(Texture& texture, Image<float>& depth, bool ownAlpha, bool mayBeUnknown) {
-    withPixels(texture, [&](auto& image, auto full) {
-        for (std::size_t i = 0; i < depth.count(); ++i) {
-            auto& alpha = image.data()[i].a;
-            if (!ownAlpha) alpha = full;
-            if (alpha == 0) depth.data()[i] = kNoDepth;
-            if (!hasPoint(depth.data()[i]) && alpha == full && !mayBeUnknown) alpha = 0;
-        }
-    });
-}
-
-/// Distances from here on are those of nothing: Blender's is 1e10, others' infinity.
-constexpr float kNothing = 1e9f;
-
-/// Makes a picture transparent where its depth, which may be smaller, has the distance of nothing.
-/// Whether there was such a pixel.
-bool clearNothing(StoredView& stored) {
-    const Image<float>& depth = stored.depth;
-    const auto nothing = [](float d) { return d >= kNothing; };
-    if (std::ranges::none_of(depth.pixels(), nothing)) return false;
-    withPixels(stored.texture, [&](auto& image, auto full) {
-        for (int y = 0; y < image.height(); ++y) {
-            for (int x = 0; x < image.width(); ++x) {
-                auto& alpha = image.at(x, y).a;
-                if (!stored.alpha) alpha = full;
-                const auto in = [](int at, int size, int of) {
-                    return static_cast<int>(static_cast<std::int64_t>(at) * of / size);
-                };
-                // Pixels that are covered in part are the silhouette of points beside them.
-                if (alpha == full && nothing(depth.at(in(x, image.width(), depth.width()),
-                                                      in(y, image.height(), depth.height()))))
-                    alpha = 0;
-            }
-        }
-    });
-    stored.alpha = true;
-    return true;
-}
-
-/// What pixels without a distance are. Depth that holds the distance of nothing somewhere, which
-/// becomes transparent, means something else by 0 and NaN; a picture that has alpha or a mask says
-/// where nothing is.
-NoDepth noDepthOf(const SetView& set, const ImageSetOptions& options, StoredView& stored) {
-    if (options.noDepth) return *options.noDepth;
-    // Its pixels are not the picture's, and each camera sees what the other does not.
-    if (set.depthCamera) return NoDepth::unknown;
-    // An export of ours.
-    if (set.planes || set.noDepth || set.pruned) return set.noDepth.value_or(NoDepth::empty);
-    bool open = false;
-    if (stored.alpha)
-        withPixels(stored.texture, [&](auto& image, auto full) {
-            open = std::ranges::any_of(image.pixels(), [&](const auto& p) { return p.a < full; });
-        });
-    if (clearNothing(stored)) return NoDepth::unknown;
-    return open ? NoDepth::empty : NoDepth::unknown;
 }
 
 bool anyPoint(const Image<float>& depth) {
@@ -233,15 +166,6 @@ Result<ReferenceView> finish(const SetView& set, std::string name, const Camera&
     setPlanes(view, set, options, job);
     return view;
 }
-
-}  // namespace
-
-void dropImpossible(Image<float>& distances) {
-    for (float& d : distances.pixels())
-        if (!(d > 0 && d < kNothing)) d = kNoDepth;
-}
-
-namespace {
 
 /// What a step of refining did to a view, with its time, until the end.
 class StepOfView {

@@ -136,10 +136,6 @@ struct SetDescription {
                                                              RefineReport& report,
                                                              bool& showsNothing, Job& job);
 
-/// Distances that are floats in scene units: NaN, 0 and negative values (not known), infinity and
-/// huge values (1e9 and more: nothing is there) are none.
-void dropImpossible(Image<float>& distances);
-
 /// Distances of integers in steps of `unit`; 0 and `alsoNone` are not known.
 [[nodiscard]] Distances scaledIntegers(double unit, float alsoNone = 0);
 

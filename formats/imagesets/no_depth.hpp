@@ -1,0 +1,21 @@
+#pragma once
+
+#include "formats/imagesets/set_view.hpp"
+
+namespace stx::imagesets {
+
+/// Where there is no point there is no object, unless its distance may be unknown. Partly covered
+/// pixels of the set's own alpha stay: they are the silhouette of points beside them.
+void coverOnlyPoints(Texture& texture, Image<float>& depth, bool ownAlpha, bool mayBeUnknown);
+
+/// What pixels without a distance are. Depth that holds the distance of nothing somewhere, which
+/// becomes transparent, means something else by 0 and NaN; a picture that has alpha or a mask says
+/// where nothing is.
+[[nodiscard]] NoDepth noDepthOf(const SetView& set, const ImageSetOptions& options,
+                                StoredView& stored);
+
+/// Distances that are floats in scene units: NaN, 0 and negative values (not known), infinity and
+/// huge values (1e9 and more: nothing is there) are none.
+void dropImpossible(Image<float>& distances);
+
+}  // namespace stx::imagesets
