@@ -74,8 +74,8 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
                                 const SaveOptions& options, Job& job);
 
 /// Writes an atlas, whole or not at all: one OpenEXR file when the name ends in .exr, else a folder
-/// of atlas.json and at most four images. Errors: invalidInput (Atlas::check()), unsupported (JPEG
-/// where OpenEXR is needed), io.
+/// of atlas.json and at most four images. Errors: usage ("-": the standard output is the
+/// program's), invalidInput (Atlas::check()), unsupported (JPEG where OpenEXR is needed), io.
 [[nodiscard]] Result<void> save(const Atlas& atlas, const std::filesystem::path& target,
                                 const SaveOptions& options, Job& job);
 
@@ -89,7 +89,7 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
 
 /// Writes a film, frame by frame in bounded memory: .mp4, .xmt, .bt, or `name_%04d.exr`. One frame
 /// is saved as its bundle. Errors: as those of a bundle; (usage) a target that holds one frame
-/// only.
+/// only, or a name with several numbers.
 [[nodiscard]] Result<void> save(Sequence& frames, const std::filesystem::path& target,
                                 const SaveOptions& options, Job& job);
 
@@ -282,7 +282,8 @@ struct PictureOptions {
 };
 
 /// Writes a picture, whole or not at all, as .png or .jpg (8-bit sRGB) or .exr (linear, with depth,
-/// and normals where the frame has them). Errors: usage (another ending), io.
+/// and normals where the frame has them). Errors: usage (another ending; "-": the standard output
+/// is the program's), io.
 [[nodiscard]] Result<void> save(const Frame& frame, const std::filesystem::path& target,
                                 const PictureOptions& options, Job& job);
 

@@ -54,6 +54,17 @@ class Calls(Case):
         stx.convert(bundle, views="ring:4", size=(32, 512), job=job)
         self.assertEqual(job.notes, ("views, width are of meshes and not used: the model has views already",))
 
+    def test_times_outside_a_film_are_noted(self):
+        bundle = stx.convert(MODEL, views="ring:2", size=(32, 32), job=stx.Job())
+        film, camera, job = stx.Film([bundle, bundle]), bundle.views[0].camera, stx.Job()
+        stx.render(film, camera, times=0.04, job=job)
+        next(stx.render(film, camera, job=job))
+        self.assertEqual(job.notes, ())
+        stx.render(film, camera, times=99.0, job=job)
+        next(stx.render(film, camera, times=[-1, 0.04, 99], job=job))
+        where = "outside the film, which is from 0 to 0.08 s by its own clock: the frame nearest in time is shown"
+        self.assertEqual(job.notes, ("the time 99 s is " + where, "2 of 3 times are " + where))
+
     def test_a_job_keeps_notes_and_tells_progress(self):
         told = []
         job = stx.Job(threads=1, progress=lambda *news: told.append(news))

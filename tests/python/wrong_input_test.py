@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Wrong input gives stx.Error, or TypeError, in one sentence that says what was found and what is expected."""
+import os
 import unittest
 
 from harness import MODEL, Case, np, plate, stx
@@ -24,6 +25,11 @@ class WrongInput(Case):
         frame = stx.render(self.bundle, self.camera)
         self.fails("usage", "a.xyz", frame.save, "a.xyz")
         self.fails("usage", "quality is 0; 1 to 100", frame.save, "a.jpg", quality=0)
+        before = os.listdir()
+        for thing in (frame, stx.pack(self.bundle)):
+            self.fails("usage", "'-' is standard output, which is the program's; a", thing.save, "-")
+        self.fails("usage", "'-' ends in ''; a bundle is written as", self.bundle.save, "-")
+        self.assertEqual(os.listdir(), before)
         self.fails("io", "missing.png", stx.compare, "missing.png", frame)
 
     def test_memory(self):
@@ -160,7 +166,13 @@ class WrongInput(Case):
         other = stx.Bundle([plate(stx.Camera((7, 4), 5))])
         self.fails("invalidInput", "", stx.Film, [self.bundle, other])
         self.fails("usage", "2 cameras and 3 times", stx.render, film, [self.camera] * 2, times=[0, 1, 2])
+        for wrong in (np.nan, np.inf, -np.inf):
+            self.fails("usage", f"time is {wrong}; a finite number of seconds", film.frame_at, wrong)
+            self.fails("usage", f"times holds {wrong}; finite numbers of seconds", stx.render, film, self.camera, times=wrong)
+            self.fails("usage", f"times holds {wrong}", stx.render, film, self.camera, times=[0.0, wrong])
         self.fails("usage", "h264 is 52", film.save, "a.mp4", h264=52)
+        self.fails("usage", "'a_%d_%d.exr' has several numbers; one is possible", film.save, "a_%d_%d.exr")
+        self.assertEqual(os.listdir(), [])
         self.fails("usage", "support is 2", stx.background, film, support=2)
         self.fails("invalidInput", "one frame", stx.background, stx.Film([self.bundle]))
 

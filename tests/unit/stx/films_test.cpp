@@ -24,5 +24,16 @@ TEST(PublicFilms, AreSavedOpenedAndReadAtATime) {
     EXPECT_EQ(refused.error().code, ErrorCode::usage);
 }
 
+TEST(PublicFilms, AreNotWrittenUnderNamesThatCannotBeOpened) {
+    const TemporaryFolder folder;
+    Job job;
+    MovingViews frames(2);
+    const auto refused = save(frames, folder / "a_%d_%d.exr", {}, job);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::usage);
+    EXPECT_NE(refused.error().message.find("has several numbers"), std::string::npos);
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
 }  // namespace
 }  // namespace stx

@@ -198,8 +198,8 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
            job: Job | None = None) -> Frame | Iterator[Frame]:
     """Draws a model: one Frame for a camera, an iterator of Frames, each drawn when it is asked for, for several.
 
-    times: of a film, seconds by its clock (None: all its frames): one time, or as many as there are cameras, or either
-    of them once. mode: 'surface' or 'splat'. quality: of surface mode, 'normal' or 'best'. backend: 'auto', 'cpu', 'gpu'
+    times: of a film, seconds by its clock (None: all its frames; outside it the nearest, with a note): one time, or as
+    many as there are cameras, or either of them once. mode: 'surface' or 'splat'. quality: of surface mode, 'normal' or 'best'. backend: 'auto', 'cpu', 'gpu'
     or 'gl'; device: number of the GPU (-1: the best). normals: frames have normals and albedo, too, as 'stx render'
     writes them into .exr. fill: what no view shows: 'background', 'spatial' or 'none'. environment: a file that is shown
     behind everything; False: not even the model's own. lights: stx.Light; with them ambient and specular: grey or (r, g, b), linear, from 0; shininess: Phong
@@ -216,7 +216,7 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
         if not isinstance(camera, Camera):
             raise TypeError(f"cameras holds {type(camera).__name__}; stx.Camera is expected")
     if isinstance(model, Film):
-        moments = _moments(model, times, len(path))
+        moments = _moments(model, times, len(path), job)
         pictures = _draw_film(model, path * (len(moments) // max(1, len(path))), moments, drawing, job)
         single = single and isinstance(times, (int, float))
     elif times is not None:
@@ -228,10 +228,11 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
     return next(pictures) if single else pictures
 
 
-def _moments(film: Film, times: float | Iterable[float] | None, cameras: int) -> list[float]:
+def _moments(film: Film, times: float | Iterable[float] | None, cameras: int, job: Job | None) -> list[float]:
     """A time for each picture."""
     wanted = film.times if times is None else times
     moments = [float(wanted)] if isinstance(wanted, (int, float)) else [float(time) for time in wanted]
+    _stx.check_times(film, moments, job)
     if len(moments) == 1:
         moments *= cameras
     if cameras not in (1, len(moments)):
