@@ -65,6 +65,21 @@ class WrongInput(Case):
             covered = np.ones((4, 6, 4), np.float32)
             covered[1, 2, 3] = wrong
             self.fails("usage", "colour has an alpha of %g; 0 to 1 is expected" % wrong, stx.View, covered, depth, self.camera)
+        normals = np.zeros((4, 6, 3), np.float32)
+        normals[..., 2] = 1
+        normals[0, 0] = 0  # none is known there
+        stx.View(colour, depth, self.camera, normals=normals)
+        for wrong in (np.nan, np.inf):
+            spoilt = normals.copy()
+            spoilt[1, 2, 0] = wrong
+            self.fails("usage", "normals holds NaN or infinity; finite values", stx.View, colour, depth, self.camera, normals=spoilt)
+        spoilt = normals.copy()
+        spoilt[1, 2] = (0, 0, 0.5)
+        self.fails("usage", "normals has a length of 0.5 at pixel (2, 1); 1, or 0 where there is none, is expected", stx.View, colour,
+                   depth, self.camera, normals=spoilt)
+        nowhere = depth.copy()
+        nowhere[1, 2] = np.inf
+        stx.View(colour, nowhere, self.camera, normals=spoilt)  # nothing is there
         self.fails("usage", "no_depth is 'none'; empty or unknown", stx.View, colour, depth, self.camera, no_depth="none")
         self.fails("usage", "depthBits is 12", stx.View, colour, depth, self.camera, depth_bits=12)
         one = stx.View(colour, depth, self.camera, name="a")
