@@ -33,6 +33,7 @@
 #include <variant>
 #include <vector>
 
+#include "formats/any/given_options.hpp"
 #include "formats/any/options.hpp"
 #include "formats/environment/environment_files.hpp"
 #include "formats/validate/validate.hpp"
@@ -94,6 +95,7 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
                                 const SaveOptions& options, Job& job);
 
 // sequenceOf(Bundle), someFrames(frames, numbers), changed(frames, change), and
+// noteUnusedOptions(), checkFrameOf()         options of open() that do not matter to an input
 // validateFile(path, ValidateOptions, Job&)   every rule that a bundle or an atlas breaks
 // openEnvironment(path, Job&)                 what is far behind a bundle (Bundle::environment);
 //                                             saveEnvironment() writes it alone

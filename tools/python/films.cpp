@@ -61,9 +61,14 @@ FilmPointer makeFilm(const std::vector<BundleModel>& bundles, double rate) {
 }
 
 FilmPointer openFilm(const std::filesystem::path& path, const py::dict& keywords, JobHandle* job) {
-    const OpenOptions options = openOptionsFrom(Keywords(keywords));
-    return std::make_shared<Film>(
-        run(job, [&](Job& part) { return openSequence(path, options, part); }));
+    const Keywords given(keywords);
+    const OpenOptions options = openOptionsFrom(given);
+    const GivenOptions names = givenFrom(given);
+    return std::make_shared<Film>(run(job, [&](Job& part) -> Result<std::unique_ptr<Sequence>> {
+        STX_TRY(auto frames, openSequence(path, options, part));
+        noteUnusedOptions(path, Reads::film, names, options, part);
+        return frames;
+    }));
 }
 
 py::object frameOf(const FilmPointer& film, py::ssize_t index, JobHandle* job) {

@@ -90,6 +90,17 @@ OpenOptions openOptionsFrom(const Keywords& given) {
     return options;
 }
 
+GivenOptions givenFrom(const Keywords& given) {
+    std::vector<std::string> names;
+    given.take("given", names);
+    GivenOptions options;
+    for (std::string& name : names) {
+        const bool ofMesh = name == "texture" || name == "materials";
+        (ofMesh ? options.ofMeshes : options.ofSets).push_back(std::move(name));
+    }
+    return options;
+}
+
 SaveOptions saveOptionsFrom(int jpegQuality, std::optional<int> h264, bool noClobber) {
     if (jpegQuality < 0 || jpegQuality > 100)
         refuse("jpeg_quality is {}; 0 (PNG, exact) to 100 is expected", jpegQuality);

@@ -39,6 +39,14 @@ def _is_path(value: object) -> bool:
     return isinstance(value, (str, os.PathLike))
 
 
+def _given(function: Any, options: dict[str, Any]) -> list[str]:
+    """The keywords of a function that have another value than they have by default."""
+    usual = function.__kwdefaults__
+    same = {name: value == usual[name] for name, value in options.items()}
+    # Arrays are compared element by element; no default is one.
+    return [name for name, equal in same.items() if getattr(equal, "ndim", 0) > 0 or not equal]
+
+
 def _model(value: Any, *kinds: type, job: Job | None = None, materials: bool = False) -> Any:
     """A model, opened (a mesh with its materials) where it is the name of a file; TypeError unless it is one of the kinds."""
     if _is_path(value):
@@ -66,10 +74,11 @@ def open(path: Path, *, texture: str | None = None, materials: bool = False, fro
     pixels, and baseline: scene units, of older Middlebury sets. fov: of a photo, vertical, degrees. depth_bits: 8, 16
     or 32 (floats). deep_colour: pictures of 16 bits become linear floats, of which they come back to the bit, and are
     not rounded to 8. refine: steps that are done at the import, as in 'auto', 'off', 'noise,edges'.
+    Keywords that do not matter to what is opened are noted; frame of a film is an error: open_film() has its frames.
     Raises Error: io, invalidInput (with byte offset, line or key), usage, unsupported.
     """
     options = {name: value for name, value in locals().items() if name not in ("path", "job")}
-    model: Mesh | Bundle | Atlas = _stx.open(path, options, job)
+    model: Mesh | Bundle | Atlas = _stx.open(path, {**options, "given": _given(open, options)}, job)
     return model
 
 
@@ -82,7 +91,7 @@ def open_film(path: Path, *, from_: str | None = None, moving: bool | None = Non
     What stands still is one frame. No picture is read before a frame is asked for. Keywords and errors: as open().
     """
     options = {name: value for name, value in locals().items() if name not in ("path", "job")}
-    return _stx.open_film(path, options, job)
+    return _stx.open_film(path, {**options, "given": _given(open_film, options)}, job)
 
 
 def convert(model: Path | Mesh | Bundle | Atlas, *, views: str = "sphere:16", cameras: Sequence[Camera] = (),
