@@ -70,7 +70,7 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
 
 /// Writes a bundle, whole or not at all, in the container of the target's ending: .exr (nothing is
 /// lost), .mp4, .xmt or .bt (depth in 8 or 16 bits, colour as PNG or JPEG). Errors: usage (another
-/// ending), invalidInput (a bundle that fails check()), io.
+/// ending, JPEG or video in .exr), invalidInput (a bundle that fails check()), io.
 [[nodiscard]] Result<void> save(const Bundle& bundle, const std::filesystem::path& target,
                                 const SaveOptions& options, Job& job);
 

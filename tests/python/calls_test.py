@@ -83,6 +83,20 @@ class Calls(Case):
             self.fails("usage", f"frame is of image sets, and '{path}' is {kind}; stx.open_film() of it has all", stx.open, path, frame=1)
             stx.open(path, frame=0)
 
+    def test_keywords_that_do_not_matter_to_drawing_are_noted(self):
+        bundle = stx.convert(self.mesh, views="ring:2", size=(32, 32))
+        film, camera = stx.Film([bundle, bundle]), bundle.views[0].camera
+        surface, splat = "splat, splat_coefficient are not used: they are of mode splat", "quality is not used: it is of mode surface"
+        on_mesh = "mode, without are not used: a mesh is rasterised itself, on the processor"
+        for model, keywords, sentence in ((bundle, {"splat": "paper", "splat_coefficient": 1.0, "quality": "best"}, surface),
+                                          (bundle, {"mode": "splat", "quality": "best", "splat": "point"}, splat),
+                                          (film, {"mode": "splat", "quality": "best"}, splat),
+                                          (self.mesh, {"mode": "splat", "without": ["holes"]}, on_mesh)):
+            job = stx.Job()
+            frames = stx.render(model, [camera, camera], job=job, **keywords)
+            self.assertEqual(len(list(frames)), 2)
+            self.assertEqual([note for note in job.notes if "not used" in note], [sentence])
+
     def test_times_outside_a_film_are_noted(self):
         bundle = stx.convert(MODEL, views="ring:2", size=(32, 32), job=stx.Job())
         film, camera, job = stx.Film([bundle, bundle]), bundle.views[0].camera, stx.Job()

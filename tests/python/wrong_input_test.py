@@ -132,6 +132,10 @@ class WrongInput(Case):
         self.fails("usage", "mode is 3; a text", render, bundle, camera, mode=3)
         self.fails("usage", "no stage 'x'", render, bundle, camera, without=["x"])
         self.fails("usage", "ambient is negative", render, bundle, camera, ambient=-1)
+        for name, value in (("ambient", 0.9), ("specular", 0.5), ("shininess", 3)):
+            self.fails("usage", f"{name} is of lighting; give lights, too", render, bundle, camera, **{name: value})
+            render(bundle, camera, lights=[stx.Light("point", (0, 0, 1))], **{name: value})
+        self.fails("usage", "colour is negative; light is 0 or more", stx.Light, "point", (0, 0, 1), colour=-1)
         for wrong in (np.nan, np.inf, -np.inf, 1e300):
             for name in ("ambient", "specular"):
                 self.fails("usage", f"{name} is {wrong}; finite", render, bundle, camera, **{name: wrong})
@@ -161,6 +165,11 @@ class WrongInput(Case):
         self.fails("usage", "the views are 'auto:x'", stx.convert, self.bundle, views="auto:x")
         self.fails("usage", "size is 0x5", stx.convert, mesh, size=(0, 5))
         self.fails("usage", "cameras is ['a']; a list of stx.Camera", stx.convert, mesh, cameras=["a"])
+        for views in ("sphere:2", "cube", "auto:2"):
+            self.fails("usage", f"elevation is of views on a ring; ring:N, not '{views}', is expected", stx.convert, mesh, views=views,
+                       elevation=70)
+        self.fails("usage", "names are of cameras; 2 are given, and no cameras", stx.convert, mesh, names=["a", "b"])
+        stx.convert(mesh, cameras=[self.camera], names=["a"], elevation=70)
         self.fails("usage", "intrinsics is (1, 2); four numbers", stx.open, MODEL, intrinsics=(1, 2))
         self.fails("usage", "depthBits is 12", stx.convert, mesh, depth_bits=12)
         self.fails("usage", "supersampling is 'x'; a whole number", stx.convert, mesh, supersampling="x")
@@ -187,7 +196,13 @@ class WrongInput(Case):
             self.fails("usage", f"times holds {wrong}", stx.render, film, self.camera, times=[0.0, wrong])
         self.fails("usage", "h264 is 52", film.save, "a.mp4", h264=52)
         self.fails("usage", "'a_%d_%d.exr' has several numbers; one is possible", film.save, "a_%d_%d.exr")
+        self.fails("usage", "'a.exr': JPEG is of MPEG-4 containers; .exr keeps colours", self.bundle.save, "a.exr", jpeg_quality=5)
+        self.fails("usage", "'a_0.exr': JPEG is of MPEG-4 containers; .exr keeps", film.save, "a_%d.exr", jpeg_quality=5)
+        self.fails("usage", "'a_0.exr': video is of MPEG-4 containers; .exr keeps", film.save, "a_%d.exr", h264=20)
         self.assertEqual(os.listdir(), [])
+        self.fails("usage", "method is of plain video, whose background is a picture", stx.background, film, method="median")
+        self.fails("usage", "frames is of plain video", stx.background, film, frames=2)
+        self.fails("usage", "support is of a stx.Film", stx.background, np.zeros((5, 8, 8, 3), np.uint8), support=0.5)
         self.fails("usage", "support is 2", stx.background, film, support=2)
         self.fails("invalidInput", "one frame", stx.background, stx.Film([self.bundle]))
 

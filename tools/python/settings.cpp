@@ -53,6 +53,13 @@ void takeLighting(const Keywords& given, Lighting& lighting) {
          {std::pair{"ambient", lighting.ambient}, std::pair{"specular", lighting.specular}})
         if (glm::any(glm::lessThan(light, glm::vec3(0))))
             refuse("{} is negative; light is 0 or more", name);
+    if (lighting.on()) return;
+    const Lighting usual;
+    const char* unused = lighting.ambient != usual.ambient       ? "ambient"
+                         : lighting.specular != usual.specular   ? "specular"
+                         : lighting.shininess != usual.shininess ? "shininess"
+                                                                 : nullptr;
+    if (unused) refuse("{} is of lighting; give lights, too", unused);
 }
 
 }  // namespace

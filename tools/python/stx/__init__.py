@@ -166,9 +166,12 @@ def background(source: Film | Path | Sequence[Path] | NDArray[np.uint8], *, supp
     pictures, or a folder, 'frame_%04d.png' or a film's name; method: 'select' (the best), 'n2pg' or 'median';
     frames: how many to look at, spread evenly, from 2 (0: all). Raises Error: usage, invalidInput, io, unsupported.
     """
+    moving, plain = {"support": support, "key_views": key_views}, {"method": method, "frames": frames}
+    for name in _given(background, plain if isinstance(source, Film) else moving):
+        of = "plain video, whose background is a picture" if name in plain else "a stx.Film; open one by stx.open_film()"
+        raise Error(ErrorCode.usage, f"{name} is of {of}")
     if isinstance(source, Film):
-        return _stx.background_of_film(source, {"support": support, "key_views": key_views}, job)
-    plain = {"method": method, "frames": frames}
+        return _stx.background_of_film(source, moving, job)
     inputs: Any = [source] if _is_path(source) else source
     if not hasattr(inputs, "dtype") and not (isinstance(inputs, Iterable) and all(map(_is_path, inputs))):
         raise TypeError(f"this is {type(source).__name__}; a stx.Film, an array of frames or names of files are expected")
@@ -217,6 +220,7 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
     Raises Error: usage, invalidInput (a camera), unsupported (a backend), failed.
     """
     drawing = {name: value for name, value in locals().items() if name not in ("model", "cameras", "times", "job")}
+    given = _given(render, drawing)
     drawing["lights"] = list(lights)
     drawing["without"] = without.split(",") if isinstance(without, str) else list(without)
     single = isinstance(cameras, Camera)
@@ -226,6 +230,7 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
             raise TypeError(f"cameras holds {type(camera).__name__}; stx.Camera is expected")
     if isinstance(model, Film):
         moments = _moments(model, times, len(path), job)
+        _note_unused(Bundle, given, mode, job)
         pictures = _draw_film(model, path * (len(moments) // max(1, len(path))), moments, drawing, job)
         single = single and isinstance(times, (int, float))
     elif times is not None:
@@ -234,7 +239,22 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
         drawn = _model(model, Mesh, Bundle, Atlas, job=job)
         # Wrong settings are errors now, not when the first picture is asked for.
         pictures = _draw(_stx.Renderer(drawn, drawing, job), path, job)
+        _note_unused(type(drawn), given, mode, job)
     return next(pictures) if single else pictures
+
+
+def _note_unused(kind: type, given: list[str], mode: str, job: Job | None) -> None:
+    """Notes keywords of render() that do not matter to this kind of model and mode, as the program does."""
+    if kind is Mesh:
+        of = ["mode", "backend", "device", "splat", "splat_coefficient", "fill", "refine", "without"]
+        why = "a mesh is rasterised itself, on the processor"
+    elif mode == "splat":
+        of, why = ["quality"], "it is of mode surface"
+    else:
+        of, why = ["splat", "splat_coefficient"], "they are of mode splat"
+    unused = [name for name in given if name in of]
+    if unused:
+        _stx.note(f"{', '.join(unused)} {'is' if len(unused) == 1 else 'are'} not used: {why}", job)
 
 
 def _moments(film: Film, times: float | Iterable[float] | None, cameras: int, job: Job | None) -> list[float]:
