@@ -290,6 +290,8 @@ Result<int> background(const BackgroundOptions& o, const Command& command, Progr
                            "is of plain video, whose background is a picture"));
         if (o.video.empty())
             STX_CHECK(command.refuse({"--crf"}, "is of video; give --video h264, too"));
+        if (const auto container = containerOf(o.output); container && *container == FileKind::exr)
+            STX_CHECK(command.refuse({"--video"}, "is of MPEG-4 containers, not of .exr"));
         return backgroundOfBundle(o, command, program);
     }
     STX_CHECK(command.refuse({"--key-views", "--video", "--crf"}, "is of bundles with time"));

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/any/given_options.hpp"
 #include "formats/any/open.hpp"
 #include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
@@ -78,53 +79,13 @@ OpenOptions openOptions(const ConvertOptions& o, const std::shared_ptr<bool>& im
 /// Heading of the help that options of image sets are under.
 constexpr const char* kSetHeading = "Image sets";
 
-/// What an input is read as.
-enum class Reads { mesh, moment, film };
-
-/// A photograph with depth, in its file or beside it.
-bool isPhoto(const Result<FileKind>& kind, const ConvertOptions& o) {
-    return kind && (*kind == FileKind::photo ||
-                    (*kind == FileKind::image && !o.open.set.depthPattern.empty()));
-}
-
-/// Whether an input is read as an image set. An .exr is a bundle or a picture with Z.
-bool isSet(const std::filesystem::path& input, const Result<FileKind>& kind,
-           const ConvertOptions& o, const Limits& limits) {
-    if (!o.open.set.from.empty() || !kind || *kind == FileKind::imageSet || isPhoto(kind, o))
-        return true;
-    if (*kind != FileKind::exr) return false;
-    const auto reader = ExrReader::open(input, limits);
-    return !reader || exrViewParts(*reader).empty();
-}
-
-/// Options that were given but do not matter to this input: lists of many inputs may hold others.
+/// Notes the options that do not matter to this input.
 void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptions& o,
                 Program& program) {
-    const auto kind = recognise(input);
-    const bool set = isSet(input, kind, o, program.job.limits);
-    const auto note = [&](const std::vector<std::string>& options, const char* ofWhat,
-                          const char* isWhat) {
-        if (options.empty()) return;
-        program.job.note(fmt::format("{} {} of {} and not used: '{}' is {}",
-                                     fmt::join(options, ", "), options.size() == 1 ? "is" : "are",
-                                     ofWhat, input.filename().string(), isWhat));
-    };
-    if (as != Reads::mesh) {
-        auto options = o.givenOfMeshes;
-        // Of an image set it is the pattern of names.
-        if (set) std::erase(options, "--texture");
-        if (isPhoto(kind, o)) std::erase(options, "--fov");
-        note(options, "meshes", kind ? nameOf(*kind) : "none");
-    } else {
-        std::vector<std::string> options;
-        if (o.refining.steps != "auto" && o.refining.steps != "off") options = {"--refine"};
-        if (o.cube) options.push_back("--cube");
-        note(options, "inputs with views", nameOf(FileKind::mesh));
-    }
-    if (set) return;
-    auto options = o.givenOfSets;
-    if (as == Reads::film) std::erase(options, "--strict");
-    note(options, "image sets", nameOf(*kind));
+    GivenOptions given{o.givenOfMeshes, o.givenOfSets, {}};
+    if (o.refining.steps != "auto" && o.refining.steps != "off") given.ofViews = {"--refine"};
+    if (o.cube) given.ofViews.push_back("--cube");
+    noteUnusedOptions(input, as, given, o.open, program.job);
 }
 
 /// What was converted, for the summary and the report.
@@ -260,29 +221,17 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
     return done;
 }
 
-/// Errors (usage) for --frame of a film that is not an image set: its first frame would be taken.
-Result<void> checkFrame(const std::filesystem::path& input, const ConvertOptions& o,
-                        Program& program) {
-    if (!o.frameGiven || !o.open.set.from.empty()) return {};
-    const auto kind = recognise(input);
-    if (!kind || (*kind != FileKind::mpeg4 && *kind != FileKind::numbered)) return {};
-    Job quiet;  // notes come with the conversion
-    quiet.workFor(program.job);
-    STX_TRY(const auto frames, openSequence(input, o.open, quiet));
-    if (!frames->timeline().moves()) return {};
-    return fail(ErrorCode::usage,
-                "--frame is of image sets, and '{}' is {}; -o 'name_%04d.exr' writes all of its "
-                "frames, and stx extract --time T one moment as a set",
-                input.string(), nameOf(*kind));
-}
-
 Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
                                           const std::filesystem::path& target,
                                           const ConvertOptions& o, Program& program) {
     const Stopwatch watch;
     STX_CHECK(checkTarget(target, program));
     STX_CHECK(containerOf(target));
-    STX_CHECK(checkFrame(input, o, program));
+    if (o.frameGiven)
+        STX_CHECK(checkFrameOf(input, o.open, "--frame",
+                               "-o 'name_%04d.exr' writes all of its frames, and stx extract "
+                               "--time T one moment as a set",
+                               program.job));
     // Only the report has the points, for which the images must be decoded.
     const bool countPoints = !program.common.report.empty();
     std::optional<Converted> done;

@@ -87,21 +87,6 @@ Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& 
     return timeline.frameAt(*time);
 }
 
-void noteOutside(const std::vector<double>& times, const Timeline& timeline, Job& job) {
-    if (!timeline.moves()) return;
-    const auto outside = static_cast<std::size_t>(
-        std::ranges::count_if(times, [&](double time) { return timeline.outside(time); }));
-    if (outside == 0) return;
-    job.note(fmt::format(
-        "{} outside the film, which is from {:.12g} to {:.12g} s by its own clock: the frame "
-        "nearest "
-        "in time is shown",
-        times.size() == 1
-            ? fmt::format("the time {:.12g} s is", times[0])
-            : fmt::format("{} of {} times {}", outside, times.size(), outside == 1 ? "is" : "are"),
-        timeline.start(), timeline.end));
-}
-
 Result<std::vector<double>> timesOf(const TimeOptions& o, const Timeline& timeline) {
     if (o.time) {
         STX_CHECK(checkTime(o.time));

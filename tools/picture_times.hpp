@@ -30,8 +30,6 @@ struct TimeOptions {
 [[nodiscard]] Result<std::size_t> momentOf(const std::optional<double>& time,
                                            const Timeline& timeline, const char* whatIs,
                                            const std::string& input, Job& job);
-/// Notes how many of the times are outside a film, and when it is.
-void noteOutside(const std::vector<double>& times, const Timeline& timeline, Job& job);
 
 /// The times that are asked for, ascending; at least one. `all` (and `cameras`, whose
 /// times are elsewhere): every frame; A:B without STEP:

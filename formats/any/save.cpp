@@ -66,6 +66,14 @@ Result<void> saveViews(const ViewTable& table, const fs::path& target, const Sav
     if (container == FileKind::exr && options.octreeLevels > 0)
         return fail(ErrorCode::usage, "'{}': an OctreeImage is written as .mp4, .xmt or .bt only",
                     target.string());
+    if (container == FileKind::exr && options.jpegQuality > 0)
+        return fail(ErrorCode::usage,
+                    "'{}': JPEG is of MPEG-4 containers; .exr keeps colours as they are",
+                    target.string());
+    if (container == FileKind::exr && options.h264 >= 0)
+        return fail(ErrorCode::usage,
+                    "'{}': video is of MPEG-4 containers; .exr keeps colours as they are",
+                    target.string());
     if (container == FileKind::exr) {
         STX_TRY(const auto summarise, summariesFor(table, options.summaries, job));
         return writeExrViews(table, target, job, {options.noClobber}, summarise);

@@ -223,6 +223,7 @@ Result<void> saveSequence(Sequence& frames, const fs::path& target, const SaveOp
                     "as in name_%04d.exr hold more",
                     target.string(), count);
     if (isNumberedExr(target)) {
+        STX_CHECK(checkPattern(target.string()));
         // Frames are drawn one after the other, each whole.
         SaveOptions each = options;
         each.summaries = SaveOptions::Summaries::none;

@@ -22,7 +22,7 @@ namespace stx {
 
 /// Writes a sequence, each file whole or not at all: MPEG-4 (see sequence_write.hpp) or one .exr
 /// for each frame, numbered from 0. A sequence of one frame is saved as its bundle. Errors as
-/// saveBundle(); (usage) a target that holds one frame only.
+/// saveBundle(); (usage) a target that holds one frame only, or several numbers in its name.
 [[nodiscard]] Result<void> saveSequence(Sequence& frames, const std::filesystem::path& target,
                                         const SaveOptions& options, Job& job);
 

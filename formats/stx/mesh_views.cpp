@@ -101,9 +101,21 @@ Result<std::optional<AutoViews>> parseAutoViews(std::string_view views) {
 
 Result<MeshViews> chooseViews(const Mesh& mesh, const ConvertSettings& s, Job& job) {
     if (!s.cameras.empty()) return MeshViews{s.cameras, {}, {}, 0, 0.0};
+    if (!s.names.empty())
+        return fail(ErrorCode::usage, "names are of cameras; {} are given, and no cameras",
+                    s.names.size());
+    const auto checkElevation = [&](bool ring) -> Result<void> {
+        if (ring || s.elevationRad == ConvertSettings().elevationRad) return {};
+        return fail(ErrorCode::usage,
+                    "elevation is of views on a ring; ring:N, not '{}', is expected", s.views);
+    };
     STX_TRY(const auto wanted, parseAutoViews(s.views));
-    if (wanted) return bestViews(mesh, *wanted, s, job);
+    if (wanted) {
+        STX_CHECK(checkElevation(false));
+        return bestViews(mesh, *wanted, s, job);
+    }
     STX_TRY(auto layout, parseViewLayout(s.views));
+    STX_CHECK(checkElevation(layout.kind == ViewLayout::Kind::ring));
     STX_TRY(const auto framing,
             framingOf(mesh, s, layout.kind == ViewLayout::Kind::cube, job.limits));
     layout.elevationRad = s.elevationRad;

@@ -55,6 +55,10 @@ Result<void> save(const Bundle& bundle, const std::filesystem::path& target,
 
 Result<void> save(const Atlas& atlas, const std::filesystem::path& target,
                   const SaveOptions& options, Job& job) {
+    if (target == "-")
+        return fail(ErrorCode::usage,
+                    "'-' is standard output, which is the program's; a folder or a name that ends "
+                    "in .exr is expected (./- is a folder of that name)");
     AtlasSaveOptions save;
     save.jpegQuality = options.jpegQuality;
     save.output.noClobber = options.noClobber;

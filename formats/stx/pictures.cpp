@@ -174,6 +174,10 @@ Picture pictureOf(const Frame& frame, const std::optional<glm::vec3>& background
 Result<void> save(const Frame& frame, const std::filesystem::path& target,
                   const PictureOptions& options, Job& job) {
     STX_CHECK(job.checkCancelled());
+    if (target == "-")
+        return fail(ErrorCode::usage,
+                    "'-' is standard output, which is the program's; a name that ends in .png, "
+                    ".jpg, .tif, .webp or .exr is expected");
     FrameOptions file;
     file.background = options.background;
     file.jpegQuality = options.jpegQuality;

@@ -33,6 +33,7 @@
 #include <variant>
 #include <vector>
 
+#include "formats/any/given_options.hpp"
 #include "formats/any/options.hpp"
 #include "formats/environment/environment_files.hpp"
 #include "formats/validate/validate.hpp"
@@ -69,13 +70,13 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
 
 /// Writes a bundle, whole or not at all, in the container of the target's ending: .exr (nothing is
 /// lost), .mp4, .xmt or .bt (depth in 8 or 16 bits, colour as PNG or JPEG). Errors: usage (another
-/// ending), invalidInput (a bundle that fails check()), io.
+/// ending, JPEG or video in .exr), invalidInput (a bundle that fails check()), io.
 [[nodiscard]] Result<void> save(const Bundle& bundle, const std::filesystem::path& target,
                                 const SaveOptions& options, Job& job);
 
 /// Writes an atlas, whole or not at all: one OpenEXR file when the name ends in .exr, else a folder
-/// of atlas.json and at most four images. Errors: invalidInput (Atlas::check()), unsupported (JPEG
-/// where OpenEXR is needed), io.
+/// of atlas.json and at most four images. Errors: usage ("-": the standard output is the
+/// program's), invalidInput (Atlas::check()), unsupported (JPEG where OpenEXR is needed), io.
 [[nodiscard]] Result<void> save(const Atlas& atlas, const std::filesystem::path& target,
                                 const SaveOptions& options, Job& job);
 
@@ -89,11 +90,12 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
 
 /// Writes a film, frame by frame in bounded memory: .mp4, .xmt, .bt, or `name_%04d.exr`. One frame
 /// is saved as its bundle. Errors: as those of a bundle; (usage) a target that holds one frame
-/// only.
+/// only, or a name with several numbers.
 [[nodiscard]] Result<void> save(Sequence& frames, const std::filesystem::path& target,
                                 const SaveOptions& options, Job& job);
 
 // sequenceOf(Bundle), someFrames(frames, numbers), changed(frames, change), and
+// noteUnusedOptions(), checkFrameOf()         options of open() that do not matter to an input
 // validateFile(path, ValidateOptions, Job&)   every rule that a bundle or an atlas breaks
 // openEnvironment(path, Job&)                 what is far behind a bundle (Bundle::environment);
 //                                             saveEnvironment() writes it alone
@@ -282,7 +284,8 @@ struct PictureOptions {
 };
 
 /// Writes a picture, whole or not at all, as .png or .jpg (8-bit sRGB) or .exr (linear, with depth,
-/// and normals where the frame has them). Errors: usage (another ending), io.
+/// and normals where the frame has them). Errors: usage (another ending; "-": the standard output
+/// is the program's), io.
 [[nodiscard]] Result<void> save(const Frame& frame, const std::filesystem::path& target,
                                 const PictureOptions& options, Job& job);
 

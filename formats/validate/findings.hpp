@@ -32,6 +32,9 @@ void checkViewHeader(const ReferenceView& view, const std::string& where, Findin
 /// Sizes, distances, normals and splats of a view whose images were read; its count of points.
 [[nodiscard]] std::int64_t checkViewImages(const ReferenceView& view, const std::string& where,
                                            Findings& findings);
+/// Rule 6007, where more than one in a hundred of `count` normals, `off`, have no length of 1.
+void checkNormalLengths(std::int64_t off, std::int64_t count, const std::string& where,
+                        Findings& findings);
 /// Rules on normals that need pixels; normals and camera of the view are in one frame.
 void checkVectors(const ReferenceView& view, const std::string& where, Findings& findings);
 

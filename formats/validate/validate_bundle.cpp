@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "formats/validate/findings.hpp"
+#include "lib/surface/normals.hpp"
 
 namespace stx {
 
@@ -26,6 +27,37 @@ std::string sizeText(int width, int height) {
 std::string viewText(std::size_t index, const std::string& name) {
     return fmt::format("view {} '{}'", index, name);
 }
+
+void checkNormalLengths(std::int64_t off, std::int64_t count, const std::string& where,
+                        Findings& findings) {
+    if (off * 100 > count)
+        findings.add(6007, where, fmt::format("{} of {} normals with another length", off, count),
+                     "length 1");
+}
+
+namespace {
+
+void checkNormalLengths(const ReferenceView& view, const std::string& where, Findings& findings) {
+    std::int64_t count = 0, off = 0, notFinite = 0;
+    for (std::size_t i = 0; i < view.depth.count(); ++i) {
+        const glm::vec3 n = view.normal.data()[i];
+        if (!hasPoint(view.depth.data()[i]) || n == glm::vec3(0)) continue;
+        ++count;
+        if (!std::isfinite(glm::dot(n, glm::vec3(1))))
+            ++notFinite;
+        else if (!hasNormalLength(n))
+            ++off;
+    }
+    // Rounding makes no such numbers, so that one is too many.
+    if (notFinite > 0)
+        findings.add(6007, where,
+                     fmt::format("{} of {} normals with NaN or infinity", notFinite, count),
+                     "length 1");
+    else
+        checkNormalLengths(off, count, where, findings);
+}
+
+}  // namespace
 
 void checkVectors(const ReferenceView& view, const std::string& where, Findings& findings) {
     if (!view.hasNormals()) return;
@@ -104,6 +136,7 @@ std::int64_t checkViewImages(const ReferenceView& view, const std::string& where
                      fmt::format("{} of {} distances outside {} to {}", outside, points,
                                  view.nearPlane, view.farPlane),
                      "distances between the planes");
+    if (view.normal.size() == size) checkNormalLengths(view, where, findings);
     if (view.normal.size() == size && view.camera.check()) checkVectors(view, where, findings);
     return points;
 }

@@ -5,6 +5,7 @@
 #include "formats/files/base64.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mapping/view_notes.hpp"
+#include "lib/surface/normals.hpp"
 
 namespace stx {
 
@@ -29,13 +30,11 @@ void checkNormalLengths(const DecodedImage& image, const Image<float>& depth,
                 }
                 if (zero) continue;  // no normal
                 ++count;
-                if (std::abs(glm::length(n) - 1.0) > 0.05) ++off;
+                if (!hasNormalLength(n)) ++off;
             }
         },
         image.values);
-    if (off * 100 > count)
-        findings.add(6007, where, fmt::format("{} of {} normals with another length", off, count),
-                     "length 1");
+    checkNormalLengths(off, count, where, findings);
 }
 
 /// `channel` of `codes` has the depth.

@@ -57,6 +57,9 @@ struct Timeline {
     [[nodiscard]] Result<void> check() const;
 };
 
+/// Notes how many of the times that are asked for are outside a film, and when it is.
+void noteOutside(const std::vector<double>& times, const Timeline& timeline, Job& job);
+
 /// `count` frames, from 1, at a rate above 0.
 [[nodiscard]] Timeline steadyTimeline(int count, double rate);
 

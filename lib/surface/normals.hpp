@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/view_table.hpp"
@@ -44,5 +46,13 @@ inline constexpr double kMaxSplatTilt = 6.0;
 /// Normal <-> RGB: n = 2 * c / max - 1 per component, made unit again; (0,0,0) is "no normal".
 [[nodiscard]] glm::u8vec3 rgbFromNormal(glm::vec3 normal);
 [[nodiscard]] glm::vec3 normalFromRgb(glm::u8vec3 rgb);
+
+/// How far from 1 the length of a normal may be (rule 6007 of the validator). In 8 bits it is off
+/// by up to 0.007: half a code on each axis.
+inline constexpr double kNormalLengthSlack = 0.05;
+/// False of NaN, too.
+inline bool hasNormalLength(glm::dvec3 normal) {
+    return std::abs(glm::length(normal) - 1.0) <= kNormalLengthSlack;
+}
 
 }  // namespace stx

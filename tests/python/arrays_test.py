@@ -53,6 +53,9 @@ class Arrays(Case):
         turned = camera.world_from_camera @ np.diag([1.0, -1, -1, 1])
         again = stx.Camera((200, 100), camera.fx, world_from_camera=turned[:3], axes="opencv")
         np.testing.assert_allclose(again.world_from_camera, camera.world_from_camera, atol=1e-12)
+        for axes in ("opengl", "opencv"):  # without a pose it is the identity of these axes
+            given = stx.Camera((200, 100), 90, world_from_camera=np.eye(4), axes=axes)
+            self.assertEqual(stx.Camera((200, 100), 90, axes=axes), given)
         np.testing.assert_allclose(camera.camera_from_world @ camera.world_from_camera, np.eye(4), atol=1e-12)
         self.assertAlmostEqual(camera.fy, 50 / np.tan(np.radians(25)))
         self.assertEqual(camera.resized((100, 50)).fx * 2, camera.fx)

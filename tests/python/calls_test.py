@@ -8,7 +8,7 @@ import threading
 import unittest
 import warnings
 
-from harness import MODEL, Case, np, stx
+from harness import MODEL, Case, np, plate, stx
 
 # Minutes of work on any machine, which reports its progress often.
 LONG = {"views": "sphere:200", "size": (1024, 1024), "supersampling": 8}
@@ -53,6 +53,60 @@ class Calls(Case):
         self.assertEqual(job.notes, ())
         stx.convert(bundle, views="ring:4", size=(32, 512), job=job)
         self.assertEqual(job.notes, ("views, width are of meshes and not used: the model has views already",))
+
+    def test_keywords_that_do_not_matter_to_what_is_opened_are_noted(self):
+        bundle = stx.convert(self.mesh, views="ring:2", size=(32, 32))
+        bundle.save("a.exr")
+        moving = stx.Film([stx.Bundle([plate(stx.Camera((8, 8), 9), depth)]) for depth in (2.0, 3.0)])
+        moving.save("f.mp4")
+        moving.save("f_%d.exr")
+        everything = {"depth_unit": .5, "depth_range": (1, 2), "no_depth": "unknown", "mask": "none.png", "depth": "d_{name}.png",
+                      "refine": "noise", "depth_bits": 8, "deep_colour": True, "moving": False, "strict": True, "texture": "t.png"}
+        more = {"intrinsics": np.array([1., 1, 1, 1]), "focal": 3, "baseline": 3, "fov": 30, "every": 2, "frame": 1, "materials": True}
+        for path, call, keywords, sentences in (
+                ("a.exr", stx.open, {"depth_unit": .5}, ("depth_unit is of image sets and not used: 'a.exr' is an OpenEXR bundle",)),
+                ("a.exr", stx.open, {**everything, **more}, (
+                    "texture, materials are of meshes and not used: 'a.exr' is an OpenEXR bundle",
+                    "frame, moving, every, strict, depth, mask, depth_range, depth_unit, no_depth, intrinsics, focal, baseline, fov, "
+                    "depth_bits, deep_colour, refine are of image sets and not used: 'a.exr' is an OpenEXR bundle")),
+                ("f.mp4", stx.open_film, everything, (
+                    "texture is of meshes and not used: 'f.mp4' is an MPEG-4 file",
+                    "moving, depth, mask, depth_range, depth_unit, no_depth, depth_bits, deep_colour, refine are of image sets and "
+                    "not used: 'f.mp4' is an MPEG-4 file")),
+                (MODEL, stx.open, {"materials": True, "every": 2, "refine": "noise"}, (
+                    "every, refine are of image sets and not used: 'amphora.obj' is a mesh",))):
+            job, usual = stx.Job(), stx.Job()
+            call(path, job=job, **keywords)
+            call(path, job=usual)
+            self.assertEqual(job.notes, usual.notes + sentences)
+        for path, kind in (("f.mp4", "an MPEG-4 file"), ("f_%d.exr", "a film of numbered files")):
+            self.fails("usage", f"frame is of image sets, and '{path}' is {kind}; stx.open_film() of it has all", stx.open, path, frame=1)
+            stx.open(path, frame=0)
+
+    def test_keywords_that_do_not_matter_to_drawing_are_noted(self):
+        bundle = stx.convert(self.mesh, views="ring:2", size=(32, 32))
+        film, camera = stx.Film([bundle, bundle]), bundle.views[0].camera
+        surface, splat = "splat, splat_coefficient are not used: they are of mode splat", "quality is not used: it is of mode surface"
+        on_mesh = "mode, without are not used: a mesh is rasterised itself, on the processor"
+        for model, keywords, sentence in ((bundle, {"splat": "paper", "splat_coefficient": 1.0, "quality": "best"}, surface),
+                                          (bundle, {"mode": "splat", "quality": "best", "splat": "point"}, splat),
+                                          (film, {"mode": "splat", "quality": "best"}, splat),
+                                          (self.mesh, {"mode": "splat", "without": ["holes"]}, on_mesh)):
+            job = stx.Job()
+            frames = stx.render(model, [camera, camera], job=job, **keywords)
+            self.assertEqual(len(list(frames)), 2)
+            self.assertEqual([note for note in job.notes if "not used" in note], [sentence])
+
+    def test_times_outside_a_film_are_noted(self):
+        bundle = stx.convert(MODEL, views="ring:2", size=(32, 32), job=stx.Job())
+        film, camera, job = stx.Film([bundle, bundle]), bundle.views[0].camera, stx.Job()
+        stx.render(film, camera, times=0.04, job=job)
+        next(stx.render(film, camera, job=job))
+        self.assertEqual(job.notes, ())
+        stx.render(film, camera, times=99.0, job=job)
+        next(stx.render(film, camera, times=[-1, 0.04, 99], job=job))
+        where = "outside the film, which is from 0 to 0.08 s by its own clock: the frame nearest in time is shown"
+        self.assertEqual(job.notes, ("the time 99 s is " + where, "2 of 3 times are " + where))
 
     def test_a_job_keeps_notes_and_tells_progress(self):
         told = []

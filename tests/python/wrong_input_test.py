@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Wrong input gives stx.Error, or TypeError, in one sentence that says what was found and what is expected."""
+import os
 import unittest
 
 from harness import MODEL, Case, np, plate, stx
@@ -24,6 +25,11 @@ class WrongInput(Case):
         frame = stx.render(self.bundle, self.camera)
         self.fails("usage", "a.xyz", frame.save, "a.xyz")
         self.fails("usage", "quality is 0; 1 to 100", frame.save, "a.jpg", quality=0)
+        before = os.listdir()
+        for thing in (frame, stx.pack(self.bundle)):
+            self.fails("usage", "'-' is standard output, which is the program's; a", thing.save, "-")
+        self.fails("usage", "'-' ends in ''; a bundle is written as", self.bundle.save, "-")
+        self.assertEqual(os.listdir(), before)
         self.fails("io", "missing.png", stx.compare, "missing.png", frame)
 
     def test_memory(self):
@@ -59,6 +65,21 @@ class WrongInput(Case):
             covered = np.ones((4, 6, 4), np.float32)
             covered[1, 2, 3] = wrong
             self.fails("usage", "colour has an alpha of %g; 0 to 1 is expected" % wrong, stx.View, covered, depth, self.camera)
+        normals = np.zeros((4, 6, 3), np.float32)
+        normals[..., 2] = 1
+        normals[0, 0] = 0  # none is known there
+        stx.View(colour, depth, self.camera, normals=normals)
+        for wrong in (np.nan, np.inf):
+            spoilt = normals.copy()
+            spoilt[1, 2, 0] = wrong
+            self.fails("usage", "normals holds NaN or infinity; finite values", stx.View, colour, depth, self.camera, normals=spoilt)
+        spoilt = normals.copy()
+        spoilt[1, 2] = (0, 0, 0.5)
+        self.fails("usage", "normals has a length of 0.5 at pixel (2, 1); 1, or 0 where there is none, is expected", stx.View, colour,
+                   depth, self.camera, normals=spoilt)
+        nowhere = depth.copy()
+        nowhere[1, 2] = np.inf
+        stx.View(colour, nowhere, self.camera, normals=spoilt)  # nothing is there
         self.fails("usage", "no_depth is 'none'; empty or unknown", stx.View, colour, depth, self.camera, no_depth="none")
         self.fails("usage", "depthBits is 12", stx.View, colour, depth, self.camera, depth_bits=12)
         one = stx.View(colour, depth, self.camera, name="a")
@@ -111,6 +132,10 @@ class WrongInput(Case):
         self.fails("usage", "mode is 3; a text", render, bundle, camera, mode=3)
         self.fails("usage", "no stage 'x'", render, bundle, camera, without=["x"])
         self.fails("usage", "ambient is negative", render, bundle, camera, ambient=-1)
+        for name, value in (("ambient", 0.9), ("specular", 0.5), ("shininess", 3)):
+            self.fails("usage", f"{name} is of lighting; give lights, too", render, bundle, camera, **{name: value})
+            render(bundle, camera, lights=[stx.Light("point", (0, 0, 1))], **{name: value})
+        self.fails("usage", "colour is negative; light is 0 or more", stx.Light, "point", (0, 0, 1), colour=-1)
         for wrong in (np.nan, np.inf, -np.inf, 1e300):
             for name in ("ambient", "specular"):
                 self.fails("usage", f"{name} is {wrong}; finite", render, bundle, camera, **{name: wrong})
@@ -140,6 +165,11 @@ class WrongInput(Case):
         self.fails("usage", "the views are 'auto:x'", stx.convert, self.bundle, views="auto:x")
         self.fails("usage", "size is 0x5", stx.convert, mesh, size=(0, 5))
         self.fails("usage", "cameras is ['a']; a list of stx.Camera", stx.convert, mesh, cameras=["a"])
+        for views in ("sphere:2", "cube", "auto:2"):
+            self.fails("usage", f"elevation is of views on a ring; ring:N, not '{views}', is expected", stx.convert, mesh, views=views,
+                       elevation=70)
+        self.fails("usage", "names are of cameras; 2 are given, and no cameras", stx.convert, mesh, names=["a", "b"])
+        stx.convert(mesh, cameras=[self.camera], names=["a"], elevation=70)
         self.fails("usage", "intrinsics is (1, 2); four numbers", stx.open, MODEL, intrinsics=(1, 2))
         self.fails("usage", "depthBits is 12", stx.convert, mesh, depth_bits=12)
         self.fails("usage", "supersampling is 'x'; a whole number", stx.convert, mesh, supersampling="x")
@@ -160,7 +190,19 @@ class WrongInput(Case):
         other = stx.Bundle([plate(stx.Camera((7, 4), 5))])
         self.fails("invalidInput", "", stx.Film, [self.bundle, other])
         self.fails("usage", "2 cameras and 3 times", stx.render, film, [self.camera] * 2, times=[0, 1, 2])
+        for wrong in (np.nan, np.inf, -np.inf):
+            self.fails("usage", f"time is {wrong}; a finite number of seconds", film.frame_at, wrong)
+            self.fails("usage", f"times holds {wrong}; finite numbers of seconds", stx.render, film, self.camera, times=wrong)
+            self.fails("usage", f"times holds {wrong}", stx.render, film, self.camera, times=[0.0, wrong])
         self.fails("usage", "h264 is 52", film.save, "a.mp4", h264=52)
+        self.fails("usage", "'a_%d_%d.exr' has several numbers; one is possible", film.save, "a_%d_%d.exr")
+        self.fails("usage", "'a.exr': JPEG is of MPEG-4 containers; .exr keeps colours", self.bundle.save, "a.exr", jpeg_quality=5)
+        self.fails("usage", "'a_0.exr': JPEG is of MPEG-4 containers; .exr keeps", film.save, "a_%d.exr", jpeg_quality=5)
+        self.fails("usage", "'a_0.exr': video is of MPEG-4 containers; .exr keeps", film.save, "a_%d.exr", h264=20)
+        self.assertEqual(os.listdir(), [])
+        self.fails("usage", "method is of plain video, whose background is a picture", stx.background, film, method="median")
+        self.fails("usage", "frames is of plain video", stx.background, film, frames=2)
+        self.fails("usage", "support is of a stx.Film", stx.background, np.zeros((5, 8, 8, 3), np.uint8), support=0.5)
         self.fails("usage", "support is 2", stx.background, film, support=2)
         self.fails("invalidInput", "one frame", stx.background, stx.Film([self.bundle]))
 

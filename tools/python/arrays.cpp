@@ -187,9 +187,14 @@ Image<float> depthFrom(py::handle value, const char* name) {
 }
 
 Image<glm::vec3> vectorsFrom(py::handle value, const char* name) {
-    return copied<glm::vec3>(imageFrom(value, name,
-                                       isImage(value, {"float16", "float32", "float64"}, {3}),
-                                       "an array of floats and of shape (height, width, 3)"));
+    auto image = copied<glm::vec3>(imageFrom(value, name,
+                                             isImage(value, {"float16", "float32", "float64"}, {3}),
+                                             "an array of floats and of shape (height, width, 3)"));
+    if (!std::ranges::all_of(image.pixels(), [](glm::vec3 v) {
+            return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+        }))
+        refuse("{} holds NaN or infinity; finite values are expected", name);
+    return image;
 }
 
 Image<std::uint8_t> maskFrom(py::handle value, const char* name) {

@@ -11,8 +11,18 @@ namespace {
 using Path = std::filesystem::path;
 
 py::object openModel(const Path& path, const py::dict& keywords, JobHandle* job) {
-    const OpenOptions options = openOptionsFrom(Keywords(keywords));
-    auto model = run(job, [&](Job& part) { return open(path, options, part); });
+    const Keywords given(keywords);
+    const OpenOptions options = openOptionsFrom(given);
+    const GivenOptions names = givenFrom(given);
+    auto model = run(job, [&](Job& part) -> Result<Model> {
+        if (options.set.frame != 0)
+            STX_CHECK(checkFrameOf(path, options, "frame",
+                                   "stx.open_film() of it has all of its frames", part));
+        STX_TRY(auto opened, open(path, options, part));
+        noteUnusedOptions(path, std::holds_alternative<Mesh>(opened) ? Reads::mesh : Reads::moment,
+                          names, options, part);
+        return opened;
+    });
     return modelObject(std::move(model), path.stem().string());
 }
 

@@ -36,13 +36,11 @@ Camera makeCamera(const py::object& size, double fx, std::optional<double> fy,
     camera.cx = cx.value_or(pixels.x * 0.5);
     camera.cy = cy.value_or(pixels.y * 0.5);
     camera.orthographic = orthographic;
-    const bool turned = looksAlongPlusZ(axes);
-    if (!pose.is_none()) {
-        glm::dmat4 worldFromCamera = poseFrom(pose, "world_from_camera");
-        if (turned) turnAxes(worldFromCamera);
-        camera.orientation = glm::normalize(glm::quat_cast(glm::dmat3(worldFromCamera)));
-        camera.position = worldFromCamera[3];
-    }
+    glm::dmat4 worldFromCamera =
+        pose.is_none() ? glm::dmat4(1.0) : poseFrom(pose, "world_from_camera");
+    if (looksAlongPlusZ(axes)) turnAxes(worldFromCamera);
+    camera.orientation = glm::normalize(glm::quat_cast(glm::dmat3(worldFromCamera)));
+    camera.position = worldFromCamera[3];
     valueOf(camera.check());
     return camera;
 }
@@ -91,7 +89,7 @@ void bindCamera(py::module_& module) {
 size: (width, height), pixels. fx, fy: focal lengths in pixels, above 0 (fy: as fx); orthographic:
 pixels per scene unit. cx, cy: image point of the viewing axis in pixels (the middle); the first
 pixel's centre is (0.5, 0.5), y runs down. world_from_camera: (4, 4) or (3, 4), rotation and position
-in scene units (the identity). axes: of that matrix, 'opengl' (+X right, +Y up, looks along -Z) or
+in scene units (the identity). axes: of that matrix, also of the identity, 'opengl' (+X right, +Y up, looks along -Z) or
 'opencv' (+Y down, looks along +Z). Raises stx.Error (usage, invalidInput) for what is no camera.)");
     camera
         .def(py::init(&makeCamera), py::arg("size"), py::arg("fx"), py::kw_only(),

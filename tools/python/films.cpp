@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
@@ -59,9 +61,14 @@ FilmPointer makeFilm(const std::vector<BundleModel>& bundles, double rate) {
 }
 
 FilmPointer openFilm(const std::filesystem::path& path, const py::dict& keywords, JobHandle* job) {
-    const OpenOptions options = openOptionsFrom(Keywords(keywords));
-    return std::make_shared<Film>(
-        run(job, [&](Job& part) { return openSequence(path, options, part); }));
+    const Keywords given(keywords);
+    const OpenOptions options = openOptionsFrom(given);
+    const GivenOptions names = givenFrom(given);
+    return std::make_shared<Film>(run(job, [&](Job& part) -> Result<std::unique_ptr<Sequence>> {
+        STX_TRY(auto frames, openSequence(path, options, part));
+        noteUnusedOptions(path, Reads::film, names, options, part);
+        return frames;
+    }));
 }
 
 py::object frameOf(const FilmPointer& film, py::ssize_t index, JobHandle* job) {
@@ -79,6 +86,16 @@ void saveFilm(const FilmPointer& film, const std::filesystem::path& path, int jp
     const SaveOptions options = saveOptionsFrom(jpegQuality, h264, noClobber);
     SharedFrames frames(film);
     run(job, [&](Job& part) { return save(frames, path, options, part); });
+}
+
+/// Notes the times that are asked for outside a film.
+void checkTimes(const FilmPointer& film, const std::vector<double>& times, JobHandle* handle) {
+    for (const double time : times)
+        if (!std::isfinite(time))
+            refuse("times holds {}; finite numbers of seconds are expected", time);
+    Job job;
+    noteOutside(times, film->timeline(), job);
+    tell(handle, job.takeNotes());
 }
 
 FilmPointer bakeFilm(const FilmPointer& film, const py::dict& keywords) {
@@ -196,8 +213,14 @@ iteration give its frames as stx.Bundle. One call at a time works; others wait.)
             "When the last frame ends, by the same clock.")
         .def(
             "frame_at",
-            [](const FilmPointer& f, double time) { return f->timeline().frameAt(time); },
-            py::arg("time"), "The number of the frame that is shown at a time, in seconds.")
+            [](const FilmPointer& f, double time) {
+                if (!std::isfinite(time))
+                    refuse("time is {}; a finite number of seconds is expected", time);
+                return f->timeline().frameAt(time);
+            },
+            py::arg("time"),
+            "The number of the frame that is shown at a time, in seconds; outside the film the "
+            "nearest one's. Raises stx.Error (usage) for NaN and infinity.")
         .def("frame", &frameOf, py::arg("index"), py::kw_only(), py::arg("job") = py::none(),
              "A frame as stx.Bundle; of a negative number from the end. Raises stx.Error (io, "
              "invalidInput).")
@@ -223,6 +246,7 @@ jpeg_quality: of colours, 1..100; 0: PNG, exact. h264: pictures that change as v
     bindStillBackground(module);
     module.def("open_film", &openFilm);
     module.def("bake_film", &bakeFilm);
+    module.def("check_times", &checkTimes);
     module.def("background_of_film", &backgroundOfFilm);
     module.def("still_background", &stillBackgroundOf);
 }

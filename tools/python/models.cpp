@@ -36,6 +36,20 @@ void clearBackground(ReferenceView& view) {
     if (auto* linear = view.texture.rgbaFloat()) clear(*linear, 0.0f);
 }
 
+/// Normals where the view has a surface are unit, or 0.
+void checkNormals(const ReferenceView& view) {
+    for (int y = 0; y < view.normal.height(); ++y) {
+        for (int x = 0; x < view.normal.width(); ++x) {
+            const glm::vec3 n = view.normal.at(x, y);
+            if (!hasPoint(view.depth.at(x, y)) || n == glm::vec3(0) || hasNormalLength(n)) continue;
+            refuse(
+                "normals has a length of {:.3g} at pixel ({}, {}); 1, or 0 where there is none, is "
+                "expected",
+                glm::length(n), x, y);
+        }
+    }
+}
+
 ViewPointer makeView(const py::object& colour, const py::object& depth, const Camera& camera,
                      std::string name, int depthBits, const std::string& noDepth,
                      const py::object& normals) {
@@ -62,6 +76,7 @@ ViewPointer makeView(const py::object& colour, const py::object& depth, const Ca
     settings.depthBits = depthBits;
     auto bundle = run(nullptr, [&](Job& job) { return convert(std::move(one), settings, job); });
     auto made = std::make_shared<ReferenceView>(std::move(bundle.views[0]));
+    if (made->hasNormals()) checkNormals(*made);
     if (!hasAlpha && made->noDepth == NoDepth::empty) clearBackground(*made);
     bleedColour(made->texture);
     return made;
@@ -120,7 +135,7 @@ colour: (height, width, 3 or 4), uint8 (sRGB) or float32 (linear light), straigh
 or 0 where there is none. Both are as large as the camera's picture; they are copied. name: unique in its
 bundle (view000, ...). depth_bits: 8, 16 or 32 (floats, which only .exr holds): depth is rounded to what
 files hold. no_depth: what pixels without a depth are: 'empty' (nothing is there) or 'unknown' (not
-measured). normals: (height, width, 3), unit, world axes. Raises stx.Error (usage, invalidInput).)")
+measured). normals: (height, width, 3), unit (within 0.05), world axes; 0 where there is none. Raises stx.Error (usage, invalidInput).)")
         .def(py::init(&makeView), py::arg("colour"), py::arg("depth"), py::arg("camera"),
              py::kw_only(), py::arg("name") = "", py::arg("depth_bits") = 16,
              py::arg("no_depth") = "empty", py::arg("normals") = py::none())

@@ -187,6 +187,8 @@ grey or (r, g, b), linear, from 0. in_camera_space: it moves with the camera.)")
                  if (light.kind == Light::Kind::directional && light.vector == glm::vec3(0))
                      refuse("vector is 0, 0, 0; a directional light must point somewhere");
                  light.colour = colourFrom(colour, "colour");
+                 if (glm::any(glm::lessThan(light.colour, glm::vec3(0))))
+                     refuse("colour is negative; light is 0 or more");
                  light.inCameraSpace = inCameraSpace;
                  return light;
              }),

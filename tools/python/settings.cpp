@@ -53,6 +53,13 @@ void takeLighting(const Keywords& given, Lighting& lighting) {
          {std::pair{"ambient", lighting.ambient}, std::pair{"specular", lighting.specular}})
         if (glm::any(glm::lessThan(light, glm::vec3(0))))
             refuse("{} is negative; light is 0 or more", name);
+    if (lighting.on()) return;
+    const Lighting usual;
+    const char* unused = lighting.ambient != usual.ambient       ? "ambient"
+                         : lighting.specular != usual.specular   ? "specular"
+                         : lighting.shininess != usual.shininess ? "shininess"
+                                                                 : nullptr;
+    if (unused) refuse("{} is of lighting; give lights, too", unused);
 }
 
 }  // namespace
@@ -87,6 +94,17 @@ OpenOptions openOptionsFrom(const Keywords& given) {
     given.take("depth_bits", set.depthBits);
     given.take("deep_colour", set.deepColour);
     takeRefining(given, set.refine);
+    return options;
+}
+
+GivenOptions givenFrom(const Keywords& given) {
+    std::vector<std::string> names;
+    given.take("given", names);
+    GivenOptions options;
+    for (std::string& name : names) {
+        const bool ofMesh = name == "texture" || name == "materials";
+        (ofMesh ? options.ofMeshes : options.ofSets).push_back(std::move(name));
+    }
     return options;
 }
 

@@ -7,6 +7,8 @@
 namespace stx::python {
 
 [[nodiscard]] OpenOptions openOptionsFrom(const Keywords& given);
+/// The keywords of `given`, a list of those that differ from their defaults, by what they are of.
+[[nodiscard]] GivenOptions givenFrom(const Keywords& given);
 [[nodiscard]] SaveOptions saveOptionsFrom(int jpegQuality, std::optional<int> h264, bool noClobber);
 [[nodiscard]] ConvertSettings convertSettingsFrom(const Keywords& given);
 [[nodiscard]] BakeSettings bakeSettingsFrom(const Keywords& given);

@@ -122,6 +122,7 @@ One job may serve any number of calls, from any thread.)")
             "cancel", [](JobHandle& h) { h.job.cancelled = true; },
             "Stops the calls that work for this job, and those to come, with stx.Error (failed). "
             "From any thread.");
+    module.def("note", [](const std::string& sentence, JobHandle* job) { tell(job, {sentence}); });
 }
 
 }  // namespace stx::python

@@ -22,6 +22,27 @@ TEST(PublicFilms, AreSavedOpenedAndReadAtATime) {
     const auto refused = save(**film, folder / "film.exr", {}, job);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::usage);
+    SaveOptions jpeg, video;
+    jpeg.jpegQuality = 90;
+    video.h264 = 20;
+    for (const auto& [options, what] : {std::pair{jpeg, "JPEG"}, {video, "video"}}) {
+        const auto lossy = save(frames, folder / "f_%d.exr", options, job);
+        ASSERT_FALSE(lossy);
+        EXPECT_EQ(lossy.error().code, ErrorCode::usage);
+        EXPECT_NE(lossy.error().message.find(what), std::string::npos) << lossy.error().message;
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder / "f_0.exr"));
+}
+
+TEST(PublicFilms, AreNotWrittenUnderNamesThatCannotBeOpened) {
+    const TemporaryFolder folder;
+    Job job;
+    MovingViews frames(2);
+    const auto refused = save(frames, folder / "a_%d_%d.exr", {}, job);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::usage);
+    EXPECT_NE(refused.error().message.find("has several numbers"), std::string::npos);
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
 }  // namespace

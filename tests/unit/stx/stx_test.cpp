@@ -110,6 +110,8 @@ TEST(Stx, RefusesSettingsOutOfRange) {
     EXPECT_EQ(codeOf([](auto& s) { s.height = 1 << 20; }), ErrorCode::usage);
     EXPECT_EQ(codeOf([](auto& s) { s.fovRad = 0; }), ErrorCode::usage);
     EXPECT_EQ(codeOf([](auto& s) { s.supersampling = 9; }), ErrorCode::usage);
+    EXPECT_EQ(codeOf([](auto& s) { s.elevationRad = 1; }), ErrorCode::usage);
+    EXPECT_EQ(codeOf([](auto& s) { s.names = {"a", "b"}; }), ErrorCode::usage);
     EXPECT_EQ(codeOf([](auto& s) { s.depthBits = 12; }), ErrorCode::usage);
 }
 

@@ -126,6 +126,12 @@ TEST(ValidateBundle, EveryRuleIsReportedOfAnExrFile) {
         {{4030}, [](ReferenceView& v) { v.depth.at(1, 0) = -1; }},
         {{4030}, [nan](ReferenceView& v) { v.depth.at(1, 0) = nan; }},
         {{6003}, [](ReferenceView& v) { v.splatV = {}; }},
+        {{6007},
+         [](ReferenceView& v) {
+             for (auto& n : v.normal.pixels()) n *= 0.5f;
+         }},
+        {{6007}, [nan](ReferenceView& v) { v.normal.at(1, 0).y = nan; }},
+        {{6007}, [inf](ReferenceView& v) { v.normal.at(1, 0).y = inf; }},
         {{6008},
          [](ReferenceView& v) {
              for (auto& n : v.normal.pixels()) n = -n;

@@ -39,6 +39,14 @@ def _is_path(value: object) -> bool:
     return isinstance(value, (str, os.PathLike))
 
 
+def _given(function: Any, options: dict[str, Any]) -> list[str]:
+    """The keywords of a function that have another value than they have by default."""
+    usual = function.__kwdefaults__
+    same = {name: value == usual[name] for name, value in options.items()}
+    # Arrays are compared element by element; no default is one.
+    return [name for name, equal in same.items() if getattr(equal, "ndim", 0) > 0 or not equal]
+
+
 def _model(value: Any, *kinds: type, job: Job | None = None, materials: bool = False) -> Any:
     """A model, opened (a mesh with its materials) where it is the name of a file; TypeError unless it is one of the kinds."""
     if _is_path(value):
@@ -66,10 +74,11 @@ def open(path: Path, *, texture: str | None = None, materials: bool = False, fro
     pixels, and baseline: scene units, of older Middlebury sets. fov: of a photo, vertical, degrees. depth_bits: 8, 16
     or 32 (floats). deep_colour: pictures of 16 bits become linear floats, of which they come back to the bit, and are
     not rounded to 8. refine: steps that are done at the import, as in 'auto', 'off', 'noise,edges'.
+    Keywords that do not matter to what is opened are noted; frame of a film is an error: open_film() has its frames.
     Raises Error: io, invalidInput (with byte offset, line or key), usage, unsupported.
     """
     options = {name: value for name, value in locals().items() if name not in ("path", "job")}
-    model: Mesh | Bundle | Atlas = _stx.open(path, options, job)
+    model: Mesh | Bundle | Atlas = _stx.open(path, {**options, "given": _given(open, options)}, job)
     return model
 
 
@@ -82,7 +91,7 @@ def open_film(path: Path, *, from_: str | None = None, moving: bool | None = Non
     What stands still is one frame. No picture is read before a frame is asked for. Keywords and errors: as open().
     """
     options = {name: value for name, value in locals().items() if name not in ("path", "job")}
-    return _stx.open_film(path, options, job)
+    return _stx.open_film(path, {**options, "given": _given(open_film, options)}, job)
 
 
 def convert(model: Path | Mesh | Bundle | Atlas, *, views: str = "sphere:16", cameras: Sequence[Camera] = (),
@@ -157,9 +166,12 @@ def background(source: Film | Path | Sequence[Path] | NDArray[np.uint8], *, supp
     pictures, or a folder, 'frame_%04d.png' or a film's name; method: 'select' (the best), 'n2pg' or 'median';
     frames: how many to look at, spread evenly, from 2 (0: all). Raises Error: usage, invalidInput, io, unsupported.
     """
+    moving, plain = {"support": support, "key_views": key_views}, {"method": method, "frames": frames}
+    for name in _given(background, plain if isinstance(source, Film) else moving):
+        of = "plain video, whose background is a picture" if name in plain else "a stx.Film; open one by stx.open_film()"
+        raise Error(ErrorCode.usage, f"{name} is of {of}")
     if isinstance(source, Film):
-        return _stx.background_of_film(source, {"support": support, "key_views": key_views}, job)
-    plain = {"method": method, "frames": frames}
+        return _stx.background_of_film(source, moving, job)
     inputs: Any = [source] if _is_path(source) else source
     if not hasattr(inputs, "dtype") and not (isinstance(inputs, Iterable) and all(map(_is_path, inputs))):
         raise TypeError(f"this is {type(source).__name__}; a stx.Film, an array of frames or names of files are expected")
@@ -198,8 +210,8 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
            job: Job | None = None) -> Frame | Iterator[Frame]:
     """Draws a model: one Frame for a camera, an iterator of Frames, each drawn when it is asked for, for several.
 
-    times: of a film, seconds by its clock (None: all its frames): one time, or as many as there are cameras, or either
-    of them once. mode: 'surface' or 'splat'. quality: of surface mode, 'normal' or 'best'. backend: 'auto', 'cpu', 'gpu'
+    times: of a film, seconds by its clock (None: all its frames; outside it the nearest, with a note): one time, or as
+    many as there are cameras, or either of them once. mode: 'surface' or 'splat'. quality: of surface mode, 'normal' or 'best'. backend: 'auto', 'cpu', 'gpu'
     or 'gl'; device: number of the GPU (-1: the best). normals: frames have normals and albedo, too, as 'stx render'
     writes them into .exr. fill: what no view shows: 'background', 'spatial' or 'none'. environment: a file that is shown
     behind everything; False: not even the model's own. lights: stx.Light; with them ambient and specular: grey or (r, g, b), linear, from 0; shininess: Phong
@@ -208,6 +220,7 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
     Raises Error: usage, invalidInput (a camera), unsupported (a backend), failed.
     """
     drawing = {name: value for name, value in locals().items() if name not in ("model", "cameras", "times", "job")}
+    given = _given(render, drawing)
     drawing["lights"] = list(lights)
     drawing["without"] = without.split(",") if isinstance(without, str) else list(without)
     single = isinstance(cameras, Camera)
@@ -216,7 +229,8 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
         if not isinstance(camera, Camera):
             raise TypeError(f"cameras holds {type(camera).__name__}; stx.Camera is expected")
     if isinstance(model, Film):
-        moments = _moments(model, times, len(path))
+        moments = _moments(model, times, len(path), job)
+        _note_unused(Bundle, given, mode, job)
         pictures = _draw_film(model, path * (len(moments) // max(1, len(path))), moments, drawing, job)
         single = single and isinstance(times, (int, float))
     elif times is not None:
@@ -225,13 +239,29 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
         drawn = _model(model, Mesh, Bundle, Atlas, job=job)
         # Wrong settings are errors now, not when the first picture is asked for.
         pictures = _draw(_stx.Renderer(drawn, drawing, job), path, job)
+        _note_unused(type(drawn), given, mode, job)
     return next(pictures) if single else pictures
 
 
-def _moments(film: Film, times: float | Iterable[float] | None, cameras: int) -> list[float]:
+def _note_unused(kind: type, given: list[str], mode: str, job: Job | None) -> None:
+    """Notes keywords of render() that do not matter to this kind of model and mode, as the program does."""
+    if kind is Mesh:
+        of = ["mode", "backend", "device", "splat", "splat_coefficient", "fill", "refine", "without"]
+        why = "a mesh is rasterised itself, on the processor"
+    elif mode == "splat":
+        of, why = ["quality"], "it is of mode surface"
+    else:
+        of, why = ["splat", "splat_coefficient"], "they are of mode splat"
+    unused = [name for name in given if name in of]
+    if unused:
+        _stx.note(f"{', '.join(unused)} {'is' if len(unused) == 1 else 'are'} not used: {why}", job)
+
+
+def _moments(film: Film, times: float | Iterable[float] | None, cameras: int, job: Job | None) -> list[float]:
     """A time for each picture."""
     wanted = film.times if times is None else times
     moments = [float(wanted)] if isinstance(wanted, (int, float)) else [float(time) for time in wanted]
+    _stx.check_times(film, moments, job)
     if len(moments) == 1:
         moments *= cameras
     if cameras not in (1, len(moments)):
