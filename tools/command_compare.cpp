@@ -188,14 +188,11 @@ std::string scoresOf(const Scores& scores, const std::string& worstOf) {
 }
 
 Result<std::optional<Image<std::uint8_t>>> openMask(const CompareOptions& o, Program& program) {
-    std::optional<Image<std::uint8_t>> mask;
-    if (o.mask.empty()) return mask;
+    if (o.mask.empty()) return std::nullopt;
     STX_TRY(const auto loaded, openPicture(o.mask, program.job));
     if (loaded.isLinear())
         return fail(ErrorCode::usage, "--mask '{}' must be an 8-bit image", o.mask);
-    mask.emplace(loaded.coded.width(), loaded.coded.height());
-    for (std::size_t i = 0; i < mask->count(); ++i) mask->pixels()[i] = loaded.coded.pixels()[i].x;
-    return mask;
+    return maskFrom(loaded.coded);
 }
 
 /// All pairs of two folders or two sequences.
@@ -263,6 +260,9 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
                     "--error-picture is '{}', one file for all frames; a numbered name is "
                     "expected, as in 'error_%04d.png'",
                     o.errorPicture);
+    if (!folders && !o.errorPicture.empty() && !o.errorPicture.ends_with(".png"))
+        return fail(ErrorCode::usage, "--error-picture is '{}'; its name must end in .png",
+                    o.errorPicture);
     STX_TRY(const auto mask, openMask(o, program));
     const auto* maskImage = mask ? &*mask : nullptr;
 
@@ -316,7 +316,11 @@ void addCompare(CommandLine& line, Program& program) {
     auto o = std::make_shared<CompareOptions>();
     c.option("A", o->a, "Image, sequence as name_%04d.png, or folder").required();
     c.option("B", o->b, "The same").required();
-    c.option("--mask", o->mask, "Image; only pixels that are white in it count").reads("IMAGE");
+    c.option("--mask", o->mask,
+             "Image; only pixels count whose luma times alpha is at least half of white in it, or, "
+             "where "
+             "it has one value beside 0, that have this one")
+        .reads("IMAGE");
     c.option("--error-picture", o->errorPicture,
              "Write where they differ as a PNG, of folders into one")
         .writes("FILE.png");

@@ -537,10 +537,12 @@ void addSetCameras(Command& c, const std::shared_ptr<ConvertOptions>& o) {
              "on the pixels of its picture (default: 7-Scenes' known one)")
         .reads("FILE|none");
     c.option("--focal", set.focal, "Focal length of older Middlebury sets, pixels").positive();
-    c.option("--baseline", set.baseline, "From the first to the last view of those sets")
+    c.option("--baseline", set.baseline,
+             "From the first to the last view of those sets that has disparities, scene units")
         .positive();
     c.option("--disparity-offset", set.disparityOffset,
-             "Added to their disparities (dmin of 2006; default 0)");
+             "Added to their disparities, pixels (default: the number in dmin.txt, which sets of "
+             "2006 have, or 0)");
     c.option("--disparity-scale", set.disparityScale,
              "Stored value of one pixel of disparity (default 1)")
         .positive();

@@ -398,6 +398,14 @@ Result<Json> describeNumbered(const fs::path& path, const InfoOptions& options, 
     for (const NumberedFile& file : files) bytes += bytesAt(file.path);
     out["bytes"] = bytes;
     addTime(out, frames->timeline());
+    if (!out.contains("bounds") || files.size() < 2) return out;
+    Job quiet;  // openSequence() has told
+    quiet.workFor(job);
+    STX_TRY(const auto bounds, boundsOfNumbered(path, quiet));
+    if (bounds && options.object.empty())
+        out["bounds"] = boundsJson(bounds->bounds, bounds->origin);
+    else
+        job.note("bounds are those of the first frame: headers do not tell those of all");
     return out;
 }
 

@@ -28,26 +28,33 @@ bool isNumberedExr(const fs::path& path) {
 class NumberedSequence : public Sequence {
   public:
     NumberedSequence(std::vector<NumberedFile> files, bool atlases, Timeline timeline,
-                     std::string object)
-        : files_(std::move(files)), atlases_(atlases) {
+                     std::string object, std::optional<FilmBounds> bounds)
+        : files_(std::move(files)), atlases_(atlases), bounds_(bounds) {
         open_.object = std::move(object);
         timeline_ = std::move(timeline);
     }
     Result<Bundle> frame(std::size_t index, Job& job) override {
         const auto& path = files_[index].path;
         STX_TRY(auto bundle, atlases_ ? openBundle(path, open_, job) : readExrBundle(path, job));
-        setTime(bundle, index);
+        tell(bundle, index);
         return bundle;
     }
     Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
         STX_TRY(auto table, openViews(files_[index].path, open_, job));
-        setTime(table->about(), index);
+        tell(table->about(), index);
         return table;
     }
 
   private:
+    /// What is of the film: when the frame is, and where all of them are, as MPEG-4 has it.
+    void tell(Bundle& about, std::size_t index) const {
+        setTime(about, index);
+        if (bounds_) about.bounds = bounds_->bounds;
+    }
+
     std::vector<NumberedFile> files_;
     bool atlases_;
+    std::optional<FilmBounds> bounds_;
     OpenOptions open_;
 };
 
@@ -77,17 +84,38 @@ class StillFile : public Sequence {
     OpenOptions options_;
 };
 
-/// When a file's moment is, and how long it is shown, where it tells.
+/// When a file's moment is, and how long it is shown, where it tells; and where its points are.
 struct Shown {
     std::optional<double> time, duration;
+    std::optional<Bounds> bounds;
+    glm::dvec3 origin{0.0};
+    bool noPoints = false;
 };
 Result<Shown> shownOf(const fs::path& path, bool atlas, const Limits& limits) {
     if (!atlas) {
         STX_TRY(const auto header, readExrBundleHeader(path, limits));
-        return Shown{header.time, header.duration};
+        const bool noPoints = std::ranges::all_of(
+            header.views, [](const ExrViewHeader& view) { return view.points == 0; });
+        return Shown{header.time, header.duration, header.bounds, header.origin, noPoints};
     }
     STX_TRY(const auto header, readAtlasHeader(path, limits));
-    return Shown{header.atlas.time, header.atlas.duration};
+    return Shown{header.atlas.time, header.atlas.duration, header.atlas.bounds,
+                 header.atlas.origin};
+}
+
+/// All together; none where a header does not tell, or counts from another origin.
+std::optional<FilmBounds> boundsOf(const std::vector<Shown>& shown) {
+    FilmBounds film;
+    film.origin = shown.front().origin;
+    for (const Shown& frame : shown) {
+        if (frame.origin != film.origin) return std::nullopt;
+        if (frame.noPoints) continue;
+        if (!frame.bounds || frame.bounds->empty()) return std::nullopt;
+        film.bounds.add(frame.bounds->min);
+        film.bounds.add(frame.bounds->max);
+    }
+    if (film.bounds.empty()) return std::nullopt;
+    return film;
 }
 
 /// The files that tell when they are shown. The others are left out with a note, so that those
@@ -173,8 +201,10 @@ Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> all,
         line.end += line.times.back() - line.times[line.count() - 2];
     line.findTick();
     STX_CHECK(within(fmt::format("'{}'", pattern.string()), line.check()));
+    // Those of an atlas are of all its objects.
+    const auto bounds = options.object.empty() ? boundsOf(film.shown) : std::nullopt;
     return std::make_unique<NumberedSequence>(std::move(files), film.atlases, std::move(line),
-                                              options.object);
+                                              options.object, bounds);
 }
 
 /// Frames as their files have them.
@@ -208,6 +238,12 @@ Result<std::unique_ptr<Sequence>> openSequence(const fs::path& path, const OpenO
     STX_TRY(auto frames, openFrames(path, options, job));
     if (!frames->timeline().moves() || options.set.strict) return frames;
     return acrossDamage(std::move(frames));
+}
+
+Result<std::optional<FilmBounds>> boundsOfNumbered(const fs::path& pattern, Job& job) {
+    STX_TRY(auto files, numberedFiles(pattern.string()));
+    STX_TRY(const auto film, usableFiles(std::move(files), pattern, false, job));
+    return boundsOf(film.shown);
 }
 
 bool holdsSequences(const fs::path& target) {

@@ -17,6 +17,16 @@ namespace stx {
 [[nodiscard]] Result<std::unique_ptr<Sequence>> openSequence(const std::filesystem::path& path,
                                                              const OpenOptions& options, Job& job);
 
+/// World bounds of all frames of a film, which count from an origin (Bundle::origin).
+struct FilmBounds {
+    Bounds bounds;
+    glm::dvec3 origin{0.0};
+};
+/// Of a film of numbered files, by their headers; none where these do not tell all. Errors: none of
+/// the files can be used.
+[[nodiscard]] Result<std::optional<FilmBounds>> boundsOfNumbered(
+    const std::filesystem::path& pattern, Job& job);
+
 /// Whether a target can hold more than one frame: MPEG-4, or a numbered name of .exr.
 [[nodiscard]] bool holdsSequences(const std::filesystem::path& target);
 

@@ -121,19 +121,37 @@ Image<glm::vec4> rgbaFloatFrom(const DecodedImage& image) {
     std::visit(
         [&](const auto& values) {
             using Value = typename std::decay_t<decltype(values)>::value_type;
-            constexpr float kScale = std::is_same_v<Value, std::uint8_t>    ? 1.0f / 255.0f
-                                     : std::is_same_v<Value, std::uint16_t> ? 1.0f / 65535.0f
+            constexpr float kWhite = std::is_same_v<Value, std::uint8_t>    ? 255.0f
+                                     : std::is_same_v<Value, std::uint16_t> ? 65535.0f
                                                                             : 1.0f;
             const auto* p = values.data();
             for (auto& q : out.pixels()) {
-                const float alpha = a < 0 ? 1.0f : static_cast<float>(p[a]) * kScale;
-                q = glm::vec4(p[r] * kScale, p[g] * kScale, p[b] * kScale, alpha);
+                // Divided: v of 255 and 257 v of 65535 are one float then.
+                const float alpha = a < 0 ? 1.0f : static_cast<float>(p[a]) / kWhite;
+                q = glm::vec4(p[r] / kWhite, p[g] / kWhite, p[b] / kWhite, alpha);
                 if (image.premultiplied && alpha > 0.0f) q = glm::vec4(glm::vec3(q) / alpha, alpha);
                 p += image.channels;
             }
         },
         image.values);
     return out;
+}
+
+Image<std::uint8_t> maskFrom(const Image<glm::u8vec4>& picture) {
+    Image<std::uint8_t> mask(picture.width(), picture.height());
+    int low = 255, high = 0;
+    for (std::size_t i = 0; i < mask.count(); ++i) {
+        const glm::u8vec4 p = picture.data()[i];
+        // Luma of BT.709 in ten-thousandths, which gives greys back exactly.
+        const int luma = (2126 * p.r + 7152 * p.g + 722 * p.b + 5000) / 10000;
+        const int share = (luma * p.a + 127) / 255;
+        mask.data()[i] = static_cast<std::uint8_t>(share);
+        if (share > 0) low = std::min(low, share);
+        high = std::max(high, share);
+    }
+    if (low == high)
+        for (auto& share : mask.pixels()) share = share > 0 ? 255 : 0;
+    return mask;
 }
 
 }  // namespace stx

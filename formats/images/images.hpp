@@ -83,6 +83,11 @@ struct DecodedImage {
 /// maximum, floats as they are. Grey is spread, missing alpha is 1.
 [[nodiscard]] Image<glm::vec4> rgbaFloatFrom(const DecodedImage& image);
 
+/// A picture as a mask: how far each pixel belongs to what it shows, 0..255, which is its luma
+/// times its alpha. Where there is one value beside 0, that is 255: COLMAP and nerfstudio keep what
+/// is not 0, and masks of theirs have 1, 255 or the number of a class.
+[[nodiscard]] Image<std::uint8_t> maskFrom(const Image<glm::u8vec4>& picture);
+
 /// PNG bytes of 1..4 channels with 8 or 16 bits (values in host order), tagged sRGB when `srgb`.
 /// The same input gives the same bytes. `level` is 0 (fast, large) to 9; from 2 on the filter of
 /// each row is chosen, which helps depth most.

@@ -64,9 +64,11 @@ struct ImageSetOptions {
     /// infinity somewhere: nothing is there, 0 and NaN are not known), else empty where the picture
     /// has transparent pixels or a mask, and unknown where it has none.
     std::optional<NoDepth> noDepth;
-    /// Older Middlebury sets: focal length in pixels, scene units from the first to the last view,
-    /// and what is added to a disparity (dmin of 2006); 0 = not given.
-    double focal = 0, baseline = 0, disparityOffset = 0;
+    /// Older Middlebury sets: focal length in pixels, and scene units from the first to the last
+    /// view that has disparities; 0 = not given.
+    double focal = 0, baseline = 0;
+    /// What is added to their disparities, in pixels. Without a value: dmin.txt, or 0.
+    std::optional<double> disparityOffset;
     /// Stored value of one pixel of disparity (Middlebury 2001: 8, 2003: 4 at quarter size).
     double disparityScale = 1;
     /// fx, fy, cx, cy of TUM and 7-Scenes recordings whose folder does not have them, in pixels as

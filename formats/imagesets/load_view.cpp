@@ -61,29 +61,20 @@ bool anyPoint(const Image<float>& depth) {
     return std::ranges::any_of(depth.pixels(), hasPoint);
 }
 
-/// Takes away what a mask does not show: its grey, and its alpha where it has one, is the share of
-/// a pixel that belongs to the object. Where there is one value beside 0, all of it is kept: COLMAP
-/// and nerfstudio keep what is not 0, and masks of theirs have 1, 255 or the number of a class.
+/// Takes away what a mask does not show, as maskFrom() has it.
 Result<void> applyMask(const SetView& set, const std::filesystem::path& file, StoredView& stored,
                        Job& job) {
     const std::string name = file.string(), where = fmt::format("'{}'", name);
     STX_TRY(const auto bytes, readFile(file, job.limits));
-    STX_TRY(const auto mask, decodeRgba8(bytes, name, job.limits));
+    STX_TRY(const auto picture, decodeRgba8(bytes, name, job.limits));
+    const Image<std::uint8_t> mask = maskFrom(picture);
     if (mask.width() != stored.texture.width() || mask.height() != stored.texture.height())
         return failAt(where, ErrorCode::invalidInput,
                       "the mask is {}x{}, but its picture '{}' has {}x{} pixels; both must match",
                       mask.width(), mask.height(), set.texture.name, stored.texture.width(),
                       stored.texture.height());
-    const auto greyOf = [](glm::u8vec4 p) { return (p.r * p.a + 127) / 255; };
-    int low = 255, high = 0;
-    for (const auto& p : mask.pixels()) {
-        const int grey = greyOf(p);
-        if (grey > 0) low = std::min(low, grey);
-        high = std::max(high, grey);
-    }
     for (std::size_t i = 0; i < mask.count(); ++i) {
-        const int grey = greyOf(mask.data()[i]);
-        const int share = low == high && grey > 0 ? 255 : grey;
+        const int share = mask.data()[i];
         if (auto* coded = stored.texture.rgba8()) {
             auto& alpha = coded->data()[i].a;
             const int own = stored.alpha ? alpha : 255;

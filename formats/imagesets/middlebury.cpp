@@ -80,9 +80,27 @@ struct NumberedPicture {
     PictureSource source;
 };
 
+/// The numbers of the two views between which an older set's baseline and disparities are.
+struct NumberedPair {
+    int first = 0, last = 4;
+    /// How far `number` is along the baseline: 0 at the first view, 1 at the last.
+    [[nodiscard]] double stepsTo(int number) const {
+        return static_cast<double>(number - first) / (last - first);
+    }
+};
+
+/// The outermost of those that have disparities, at least one. A single one does not say where the
+/// other is: four numbers away, as in published sets (1 and 5, 2 and 6).
+NumberedPair pairOf(const std::vector<int>& disparities) {
+    const auto [low, high] = std::ranges::minmax(disparities);
+    if (low != high) return {low, high};
+    return low > 4 ? NumberedPair{low - 4, low} : NumberedPair{low, low + 4};
+}
+
 /// See SetView::shift, of view `number`. Integers may have been cut off, which takes half a step in
 /// the mean, and rectified pictures lie a little beside each other: a step either way at most.
-auto shiftBy(const std::vector<NumberedPicture>& pictures, int number, double scale) {
+auto shiftBy(const std::vector<NumberedPicture>& pictures, const NumberedPair& pair, int number,
+             double scale) {
     return [=](const Image<float>& values, const Texture& texture, Job& job) {
         std::vector<SidePicture> beside;
         std::optional<std::size_t> first;  // of those beside
@@ -94,7 +112,8 @@ auto shiftBy(const std::vector<NumberedPicture>& pictures, int number, double sc
                 read->texture.height() != texture.height())
                 continue;
             if (p.number < number && p.number == pictures.front().number) first = beside.size();
-            beside.push_back({std::move(read->texture), (p.number - number) / 4.0});
+            beside.push_back(
+                {std::move(read->texture), pair.stepsTo(p.number) - pair.stepsTo(number)});
         }
         Image<float> disparities = values;
         for (float& d : disparities.pixels())
@@ -115,9 +134,9 @@ Result<SetDescription> describeOlder(const path& folder, const ImageSetOptions& 
     if (!(options.disparityScale > 0))
         return failAt(where, ErrorCode::usage, "the disparity scale is {:g}; it must be above 0",
                       options.disparityScale);
-    double offset = options.disparityOffset;
+    double offset = options.disparityOffset.value_or(0);
     std::error_code ec;
-    if (offset == 0 && std::filesystem::is_regular_file(folder / "dmin.txt", ec)) {
+    if (!options.disparityOffset && std::filesystem::is_regular_file(folder / "dmin.txt", ec)) {
         STX_TRY(const auto bytes, readSetFile(folder / "dmin.txt", job.limits));
         const auto lines = linesOf(textOf(bytes));
         const std::string place = inQuotes((folder / "dmin.txt").string());
@@ -127,22 +146,23 @@ Result<SetDescription> describeOlder(const path& folder, const ImageSetOptions& 
     }
     SetDescription set;
     const auto files = filesIn(folder);
-    // Views 1 to 5 (2005, 2006) or 2 to 6 (2001, 2003): the baseline spans four steps.
-    int first = 2;
-    for (const std::string& name : files) {
-        const auto stem = path(name).stem().string();
-        if (numberAfter(stem, "disp") == 1 || numberAfter(stem, "view") == 1) first = 1;
-    }
     std::vector<NumberedPicture> pictures;
+    std::vector<int> disparities;
     for (const std::string& name : files) {
         const auto stem = path(name).stem().string();
+        if (const auto number = numberAfter(stem, "disp")) disparities.push_back(*number);
         const auto number = numberAfter(stem, "view");
         const auto older = number ? number : numberAfter(stem, "im");
         if (!older) continue;
         STX_TRY(auto source, sourceInside(folder, name, where, job.limits));
         pictures.push_back({*older, std::move(source)});
     }
+    if (disparities.empty())
+        return failAt(where, ErrorCode::io,
+                      "no disparity image was found in it; disp1.png and disp5.png, or such, are "
+                      "expected");
     std::ranges::sort(pictures, {}, &NumberedPicture::number);
+    const NumberedPair pair = pairOf(disparities);
     for (const std::string& name : files) {
         const auto number = numberAfter(path(name).stem().string(), "disp");
         if (!number) continue;
@@ -154,19 +174,15 @@ Result<SetDescription> describeOlder(const path& folder, const ImageSetOptions& 
         STX_TRY(view.depth, sourceInside(folder, name, where, job.limits));
         STX_TRY(const auto size, within(where, imageSizeOf(view.texture, job)));
         // The pictures are cropped such that a disparity of `offset` is 0.
-        const double steps = (*number - first) / 4.0;
+        const double steps = pair.stepsTo(*number);
         view.camera = cameraAt(options.baseline * steps, options.focal,
                                size.x * 0.5 + offset * steps, size.y * 0.5, size.x, size.y);
         view.distances =
             distancesOf(options.baseline * options.focal, options.disparityScale, offset);
-        view.shift = shiftBy(pictures, *number, options.disparityScale);
+        view.shift = shiftBy(pictures, pair, *number, options.disparityScale);
         view.measured = true;
         set.views.push_back(std::move(view));
     }
-    if (set.views.empty())
-        return failAt(where, ErrorCode::io,
-                      "no disparity image was found in it; disp1.png and disp5.png, or such, are "
-                      "expected");
     return set;
 }
 

@@ -53,7 +53,7 @@ const std::vector<SetOption>& setOptions() {
          {"middlebury"},
          "Middlebury sets without calib.txt"},
         {"--disparity-offset",
-         [](const O& o) { return o.disparityOffset != 0; },
+         [](const O& o) { return o.disparityOffset.has_value(); },
          {"middlebury"},
          "Middlebury sets without calib.txt"},
         {"--disparity-scale",

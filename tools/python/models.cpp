@@ -199,7 +199,8 @@ views: at least one stx.View, all of one kind of colour. title: of the file. The
 read-only and show its memory; they keep it alive.)");
     bindSave<BundleModel>(
         type,
-        R"(Writes it, whole or not at all, by the ending: .exr (nothing is lost), .mp4, .xmt or .bt.
+        R"(Writes it, whole or not at all, by the ending: .exr (exact, but for colours under alpha 0,
+which OpenEXR's premultiplied pixels do not hold), .mp4, .xmt or .bt.
 
 jpeg_quality: of colours in .mp4, .xmt and .bt, 1..100; 0: PNG, exact. no_clobber: a target that exists
 is an error. Raises stx.Error (usage, invalidInput, io).)");

@@ -80,7 +80,7 @@ struct SceneReadOptions {
 /// The first string of the WorldInfo of scenes that are made from bundles.
 inline constexpr const char* kMadeByUs = "made by stx";
 
-class DepthLoss;
+struct PictureLoss;
 
 struct SceneWriteOptions {
     enum class Texture { png, jpeg };
@@ -103,8 +103,8 @@ struct SceneWriteOptions {
     /// Where each view's depth is unknown, of a sequence without alpha (see UnknownPixels::text());
     /// empty: as its picture says.
     std::vector<std::string> unknownWhere;
-    /// Of sequences: hears how far off depth is, which is then noted for all frames; null: noted.
-    DepthLoss* depthLoss = nullptr;
+    /// Of sequences: hears what pictures lose, which is then noted for all frames; null: noted.
+    PictureLoss* loss = nullptr;
 };
 
 /// A presentation of a bundle: Group { WorldInfo, DepthImage..., Background, Viewpoint,

@@ -380,24 +380,14 @@ class SceneWriter {
                 "{}: its principal point is off the centre; padded by {} {} {} {} pixels (left, "
                 "top, right, bottom), the rest of {:.3g} pixels is moved",
                 viewName(i), p.left, p.top, p.right, p.bottom, p.shift));
-        (options_.depthLoss ? *options_.depthLoss : depthLoss_)
-            .add(view, bitsOf(view), images.worstDepth);
-        clamped_ = clamped_ || images.clamped;
-        coverageLost_ = coverageLost_ || images.coverageLost;
+        (options_.loss ? *options_.loss : loss_).add(i, view, bitsOf(view), images);
         unmeasuredLost_ = unmeasuredLost_ || images.unmeasuredLost;
         dropped_ = dropped_ || (!isV2(view) && (view.hasNormals() || view.hasSplats()));
     }
     void sayTotals() {
-        depthLoss_.note(job_);
-        if (table_.kindsOf(0).linear)
-            job_.note(clamped_ ? "linear colour becomes 8-bit sRGB; values above 1 are clipped"
-                               : "linear colour becomes 8-bit sRGB");
-        if (options_.texture == SceneWriteOptions::Texture::jpeg && !options_.pointTexture)
-            job_.note(
-                fmt::format("colour is JPEG of quality {}, which is lossy", options_.jpegQuality));
-        if (coverageLost_)
-            job_.note(fmt::format("{} has no alpha: soft edges of the coverage are lost",
-                                  options_.pointTexture ? "a PointTexture" : "JPEG"));
+        // An OctreeImage has colours, too, and no pictures to be added.
+        loss_.linear = loss_.linear || table_.kindsOf(0).linear;
+        if (!options_.loss) loss_.note(options_, job_);
         if (unmeasuredLost_)
             job_.note(
                 "a PointTexture has points only: colours without a depth are lost; a DepthImage "
@@ -413,9 +403,8 @@ class SceneWriter {
     UpdateObjectDescriptors update_;
     Bounds bounds_;
     std::set<std::string> taken_;
-    DepthLoss depthLoss_;
-    bool clamped_ = false, coverageLost_ = false, dropped_ = false, vectorsLost_ = false,
-         unmeasuredLost_ = false;
+    PictureLoss loss_;
+    bool dropped_ = false, vectorsLost_ = false, unmeasuredLost_ = false;
 };
 
 }  // namespace

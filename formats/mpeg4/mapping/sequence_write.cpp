@@ -8,13 +8,12 @@
 #include <optional>
 #include <utility>
 
+#include "formats/mpeg4/mapping/coded_view.hpp"
 #include "formats/mpeg4/mapping/media_clock.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mapping/video_write.hpp"
-#include "formats/mpeg4/mapping/view_images.hpp"
 #include "formats/mpeg4/mapping/view_notes.hpp"
 #include "formats/video/video_process.hpp"
-#include "lib/model/same_pictures.hpp"
 #include "lib/model/view_table.hpp"
 
 namespace stx::mpeg4 {
@@ -27,49 +26,9 @@ struct ViewRange {
     float longestSplat = 0;
     bool normals = false, splats = false;
     bool everUnknown = false;  ///< NoDepth::unknown, of its frames
-    UnknownPixels unknown;     ///< of films whose pictures have no alpha
-    Refined refined;           ///< steps of the first frame, and the largest doubt
-};
-
-/// The images of a SimpleTexture, in the order in which they are coded.
-constexpr std::array kRoles = {"texture", "depth", "normal", "splatU", "splatV"};
-const Bytes& imageOf(const ViewImages& images, std::size_t role) {
-    const std::array all = {&images.texture, &images.depth, &images.normal, &images.splatU,
-                            &images.splatV};
-    return *all[role];
-}
-
-/// A frame of a view, when its pixels are gone.
-struct ViewBefore {
-    ViewHeader header;
-    PicturesKey pictures;
-
-    static ViewBefore of(const ReferenceView& view) {
-        ViewBefore before{view, PicturesKey::of(view)};
-        before.header.colourFile = {};
-        return before;
-    }
-    /// Whether both are coded alike: the lens counts, too, as pictures are padded by it.
-    [[nodiscard]] bool codedAs(const ViewBefore& other) const {
-        const Camera &c = header.camera, &d = other.header.camera;
-        return c.orthographic == d.orthographic && c.fx == d.fx && c.fy == d.fy && c.cx == d.cx &&
-               c.cy == d.cy && pictures == other.pictures;
-    }
-};
-
-/// An image that was coded, without its bytes.
-struct CodedImage {
-    std::size_t size = 0, hash = 0;
-
-    static CodedImage of(const Bytes& bytes) { return {bytes.size(), hashOf(bytes)}; }
-    bool operator==(const CodedImage&) const = default;
-};
-
-/// A frame of a view on its way: coded from several threads, then added in the views' order.
-struct ComingView {
-    ViewBefore view;
-    ViewImages images;
-    bool again = false;  ///< of its images only the padding is there: they are those before
+    bool everEmpty = false;
+    UnknownPixels unknown;  ///< of films whose pictures have no alpha
+    Refined refined;        ///< steps of the first frame, and the largest doubt
 };
 
 /// A view on its way into the document.
@@ -83,6 +42,7 @@ struct ViewTrack {
     std::array<ByteRange, 2> planes;
     std::array<bool, kRoles.size()> changed{};
     std::array<int, 2> video{-1, -1};  ///< of colour and depth in H.264: VideoStreams' number
+    bool coverageLost = false;         ///< by colour that is H.264
 };
 
 class SequenceWriter {
@@ -131,10 +91,12 @@ class SequenceWriter {
         if (!table) return tl::unexpected(table.error().at(placeOf(i)));
         if (ranges_.empty()) return table;
         std::vector<ViewHeader> headers;
+        loss_.ownSteps.clear();
         for (const ReferenceView& view : std::as_const(**table).about().views)
             headers.push_back(view);
         for (std::size_t k = 0; k < std::min(headers.size(), ranges_.size()); ++k) {
             ViewHeader& view = headers[k];
+            loss_.ownSteps.push_back(view.depthCode().step());
             view.nearPlane = ranges_[k].nearPlane;
             view.farPlane = ranges_[k].farPlane;
             view.depthBits = ranges_[k].depthBits;
@@ -166,6 +128,12 @@ class SequenceWriter {
             if (looked) looked = lookAt(*table, ranges, i == 0, quiet);
             if (!looked) return tl::unexpected(looked.error().at(placeOf(i)));
         }
+        for (std::size_t k = 0; k < ranges.size(); ++k)
+            if (ranges[k].everUnknown && ranges[k].everEmpty)
+                job_.note(
+                    fmt::format("view '{}': missing depth is empty in some frames and unknown in "
+                                "others; in MPEG-4 it is unknown in all",
+                                first_.views[k].name));
         ranges_ = std::move(ranges);
         return {};
     }
@@ -230,8 +198,10 @@ class SequenceWriter {
                         asVideo() ? "H.264" : "JPEG");
         if (view.noDepth == NoDepth::unknown)
             range.everUnknown = true;
-        else
+        else {
+            range.everEmpty = true;
             range.unknown.addEmpty();
+        }
         range.nearPlane = std::min(range.nearPlane, view.nearPlane);
         range.farPlane = std::max(range.farPlane, view.farPlane);
         range.depthBits = std::max(range.depthBits, view.depthBits);
@@ -253,7 +223,7 @@ class SequenceWriter {
             options.unknownWhere.emplace_back();
             if (range.unknown.any()) STX_SET(options.unknownWhere.back(), range.unknown.text());
         }
-        if (!asVideo()) options.depthLoss = &depthLoss_;
+        options.loss = &loss_;
         std::vector<ViewBefore> before(table->count());
         table = watchedViews(std::move(table), [&](std::size_t k, const ReferenceView& view) {
             before[k] = ViewBefore::of(view);
@@ -312,8 +282,9 @@ class SequenceWriter {
                 for (std::size_t r = 0; r < track.planes.size(); ++r) {
                     const Bytes& planes = imageOf(coming.images, r);
                     STX_TRY(track.planes[r], spool_.add(planes));
-                    track.last[r] = CodedImage::of(planes);
+                    track.last[r] = CodedImage::of(coming.images, r);
                 }
+                track.coverageLost = coming.images.coverageLost;
                 worstDepth_ = std::max(worstDepth_, coming.images.worstDepth);
                 return {};
             });
@@ -387,7 +358,14 @@ class SequenceWriter {
         STX_TRY(images.depth, depthPlane(view.depth, code, images.padding, images.worstDepth));
         bool clamped = false;
         const Rgba8Image colour = rgba8FromTexture(view.texture, clamped);
+        images.linear = view.texture.isLinear();
+        images.clamped = clamped;
         images.coverageLost = !alphaFollowsDepth(colour, view.depth, view.depthMayBeUnknown());
+        if (images.coverageLost) {
+            Bytes alpha;
+            for (const glm::u8vec4 p : colour.pixels()) alpha.push_back(std::byte{p.a});
+            images.coverage = hashOf(alpha);
+        }
         images.texture = yuvPlanes(padded(colour, images.padding));
         return images;
     }
@@ -402,12 +380,19 @@ class SequenceWriter {
 
     Result<void> addImages(ViewTrack& track, const ViewImages& images, const ViewHeader& view,
                            std::uint64_t now) {
-        depthLoss_.add(view, writtenDepthBits(view, options_), images.worstDepth);
+        if (asVideo()) {
+            loss_.linear = loss_.linear || images.linear;
+            loss_.clamped = loss_.clamped || images.clamped;
+            track.coverageLost = track.coverageLost || images.coverageLost;
+        } else {
+            const auto k = static_cast<std::size_t>(&track - tracks_.data());
+            loss_.add(k, view, writtenDepthBits(view, options_), images);
+        }
         std::array<CodedImage, kRoles.size()> found;
         bool any = false;
         for (std::size_t r = 0; r < kRoles.size(); ++r) {
             if (!track.streams[r]) continue;
-            found[r] = CodedImage::of(imageOf(images, r));
+            found[r] = CodedImage::of(images, r);
             const bool differs = found[r] != track.last[r];
             track.changed[r] = track.changed[r] || differs;
             any = any || differs;
@@ -458,16 +443,16 @@ class SequenceWriter {
         }
         track.last[r] = found;
         worstDepth_ = std::max(worstDepth_, images.worstDepth);
-        coverageLost_ = coverageLost_ || images.coverageLost;
         return video_->add(number, now, planes);
     }
 
     /// What H.264 loses.
     void noteVideo() {
-        bool half = false, whole = false, depth = false;
+        bool half = false, whole = false, depth = false, coverageLost = false;
         for (const ViewTrack& track : tracks_) {
             depth = depth || track.video[1] >= 0;
             if (track.video[0] < 0) continue;
+            coverageLost = coverageLost || track.coverageLost;
             const ElementaryStream& colour = *track.streams[0];
             (chromaFormatOf(colour.width, colour.height) == 1 ? half : whole) = true;
         }
@@ -481,8 +466,7 @@ class SequenceWriter {
                 fmt::format("colour with an odd side is H.264 (4:4:4) of quality {}, which is "
                             "lossy",
                             options_.h264));
-        if ((half || whole) && coverageLost_)
-            job_.note("H.264 has no alpha: soft edges of the coverage are lost");
+        if (coverageLost) job_.note("H.264 has no alpha: soft edges of the coverage are lost");
         if (depth)
             job_.note(
                 fmt::format("depth that moves is lossless H.264 of 8 or 10 bits: at most "
@@ -494,6 +478,12 @@ class SequenceWriter {
     Result<void> moveCamera(ViewTrack& track, const ViewImages& images, const Camera& camera,
                             std::uint64_t now) {
         const Camera& was = track.camera;
+        if (camera.orthographic != was.orthographic)
+            return fail(ErrorCode::unsupported,
+                        "the camera is {} and was {} before; in MPEG-4 a view keeps one projection "
+                        "for a whole film; write .exr",
+                        camera.orthographic ? "orthographic" : "perspective",
+                        was.orthographic ? "orthographic" : "perspective");
         if (!camera.orthographic && (camera.cx != was.cx || camera.cy != was.cy))
             return fail(ErrorCode::unsupported,
                         "the principal point moves from {:.6g} {:.6g} to {:.6g} {:.6g}; in MPEG-4 "
@@ -520,7 +510,8 @@ class SequenceWriter {
     /// Durations, and MovieTextures where a stream has become one.
     Result<void> finish() {
         STX_CHECK(video_->finish());
-        asVideo() ? noteVideo() : depthLoss_.note(job_);
+        loss_.note(options_, job_);
+        if (asVideo()) noteVideo();
         STX_TRY(const ByteSource source, spool_.source());
         for (const ViewTrack& track : tracks_)
             for (ElementaryStream* stream : track.streams)
@@ -566,9 +557,8 @@ class SequenceWriter {
     std::vector<ViewTrack> tracks_;
     std::uint32_t scale_ = 1000;
     std::optional<VideoStreams> video_;
-    DepthLoss depthLoss_;    ///< of pictures
+    PictureLoss loss_;       ///< of pictures; of video colour's range alone
     double worstDepth_ = 0;  ///< of video
-    bool coverageLost_ = false;
 };
 
 }  // namespace

@@ -47,10 +47,12 @@ float longestSplatOf(const ReferenceView& view) {
     return longest > 0 ? longest : 1.0f;
 }
 
-void DepthLoss::add(const ViewHeader& view, int bits, double worstDepth) {
+void DepthLoss::add(const ViewHeader& view, int bits, double worstDepth, double ownStep) {
     // Depth that is on the codes already is off by what floats are, which is not worth a word.
-    const double rounding = std::max(0.01 * view.depthCode().step(), 1e-6 * view.farPlane);
-    if (view.depthBits != 32 && bits >= view.depthBits && !(bits == 8 && worstDepth > rounding))
+    const double floats = 1e-6 * view.farPlane;
+    const double rounding = std::max(0.01 * view.depthCode().step(), floats);
+    if (view.depthBits != 32 && bits >= view.depthBits && !(bits == 8 && worstDepth > rounding) &&
+        worstDepth <= 0.5 * ownStep + floats)
         return;
     worst_ = std::max(worst_, worstDepth);
     bits_ = bits_ == 0 ? bits : std::min(bits_, bits);
@@ -60,6 +62,26 @@ void DepthLoss::note(Job& job) const {
     if (worst_ > 0)
         job.note(fmt::format("depth is rounded to {} bits: at most {:.4g} scene units off", bits_,
                              worst_));
+}
+
+void PictureLoss::add(std::size_t i, const ViewHeader& view, int bits, const ViewImages& images) {
+    const double step = i < ownSteps.size() ? ownSteps[i] : view.depthCode().step();
+    depth.add(view, bits, images.worstDepth, step);
+    linear = linear || images.linear;
+    clamped = clamped || images.clamped;
+    coverage = coverage || images.coverageLost;
+}
+
+void PictureLoss::note(const SceneWriteOptions& options, Job& job) const {
+    depth.note(job);
+    if (linear)
+        job.note(clamped ? "linear colour becomes 8-bit sRGB; values above 1 are clipped"
+                         : "linear colour becomes 8-bit sRGB");
+    if (options.texture == SceneWriteOptions::Texture::jpeg && !options.pointTexture)
+        job.note(fmt::format("colour is JPEG of quality {}, which is lossy", options.jpegQuality));
+    if (coverage)
+        job.note(fmt::format("{} has no alpha: soft edges of the coverage are lost",
+                             options.pointTexture ? "a PointTexture" : "JPEG"));
 }
 
 Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions& options,
@@ -75,6 +97,7 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
     const DepthCode code{out.nearPlane, out.farPlane,
                          writtenDepthBits(view, options) == 8 ? 255u : 65535u};
     const bool mayBeUnknown = view.depthMayBeUnknown();
+    out.linear = view.texture.isLinear();
     if (options.pointTexture) {
         for (const float d : view.depth.pixels()) {
             if (!(d >= 0)) return depthError(d);

@@ -15,22 +15,39 @@ struct ViewImages {
     Bytes texture, depth, normal, splatU, splatV;  ///< files; empty where the view has none
     std::string unknown;    ///< where its depth is unknown, if that can be: what its note says
     double worstDepth = 0;  ///< largest error of the depth's code, scene units
+    bool linear = false;    ///< colour was, and is 8-bit sRGB now
     bool clamped = false;   ///< linear colour above 1 was cut
     bool unmeasuredLost = false;  ///< colours without a depth
     bool coverageLost = false;
+    /// Of planes of video, which have no alpha, where coverage is lost: a hash of it; else 0.
+    std::size_t coverage = 0;
 };
 
 /// The largest error of depth that is rounded to codes, for a note.
 class DepthLoss {
   public:
-    /// Of a view whose depth is written in `bits`, with ViewImages::worstDepth.
-    void add(const ViewHeader& view, int bits, double worstDepth);
+    /// Of a view whose depth is written in `bits`, with ViewImages::worstDepth. `ownStep`: scene
+    /// units between codes of its bits and its own planes; where a film has one range for all
+    /// frames, depth may be further off than half of it.
+    void add(const ViewHeader& view, int bits, double worstDepth, double ownStep);
     /// Says how far off depth is, if some is.
     void note(Job& job) const;
 
   private:
     double worst_ = 0;  ///< scene units
     int bits_ = 0;
+};
+
+/// What pictures of MPEG-4 lose of the views that are added, for notes.
+struct PictureLoss {
+    DepthLoss depth;
+    bool linear = false, clamped = false, coverage = false;
+    /// DepthLoss::add()'s of each view, where the views have the range of a film; else empty.
+    std::vector<double> ownSteps;
+
+    /// Of view number `i`, whose depth is written in `bits`.
+    void add(std::size_t i, const ViewHeader& view, int bits, const ViewImages& images);
+    void note(const SceneWriteOptions& options, Job& job) const;
 };
 
 /// Encodes the images of a view. `longestSplat` above 0: the range of the splats, of a sequence

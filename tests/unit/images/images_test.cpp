@@ -287,4 +287,20 @@ TEST(Probe, OtherKindsAreUnsupported) {
 }
 
 }  // namespace
+TEST(Masks, GreyAndAlphaCountAndOneValueIsWhite) {
+    const auto codes = [](std::initializer_list<glm::u8vec4> pixels) {
+        Image<glm::u8vec4> picture(static_cast<int>(pixels.size()), 1);
+        std::copy(pixels.begin(), pixels.end(), picture.data());
+        const auto mask = maskFrom(picture);
+        return std::vector<int>(mask.pixels().begin(), mask.pixels().end());
+    };
+    using Codes = std::vector<int>;
+    EXPECT_EQ(codes({{7, 7, 7, 255}, {99, 99, 99, 255}, {0, 0, 0, 255}}), (Codes{7, 99, 0}));
+    EXPECT_EQ(codes({{255, 255, 255, 128}, {255, 255, 255, 255}}), (Codes{128, 255}));
+    EXPECT_EQ(codes({{255, 0, 0, 255}, {0, 255, 0, 255}, {0, 0, 255, 255}}), (Codes{54, 182, 18}));
+    EXPECT_EQ(codes({{0, 0, 1, 255}, {0, 0, 9, 255}, {0, 0, 0, 255}}), (Codes{0, 255, 0}));
+    EXPECT_EQ(codes({{0, 0, 255, 255}, {255, 255, 255, 0}}), (Codes{255, 0}));
+    EXPECT_EQ(codes({{0, 0, 0, 255}}), (Codes{0}));
+}
+
 }  // namespace stx

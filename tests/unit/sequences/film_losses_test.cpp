@@ -1,0 +1,143 @@
+// What films lose in MPEG-4 is said, whichever frame it is of.
+
+#include <array>
+
+#include "formats/any/sequences.hpp"
+#include "tests/shared_data.hpp"
+#include "tests/unit/sequences/moving_views.hpp"
+
+using namespace stx;
+
+namespace {
+
+/// Frames of one view, each made by `change` of its number from one that loses nothing.
+class ChangedViews : public Sequence {
+  public:
+    explicit ChangedViews(std::function<void(ReferenceView&, std::size_t)> change, int count = 3)
+        : change_(std::move(change)) {
+        timeline_ = steadyTimeline(count, 25);
+    }
+    Result<Bundle> frame(std::size_t index, Job&) override {
+        Bundle bundle;
+        bundle.views = {mpeg4::makeView(24, 16, 16, 1)};
+        ReferenceView& view = bundle.views[0];
+        view.texture = Texture(Rgba8Image(24, 16, {10, 200, 30, 255}));
+        const DepthCode code = view.depthCode();
+        for (std::size_t i = 0; i < view.depth.count(); ++i)
+            view.depth.data()[i] =
+                static_cast<float>(code.decode(100 * static_cast<std::uint32_t>(i) + 100));
+        change_(view, index);
+        setTime(bundle, index);
+        return bundle;
+    }
+
+  private:
+    std::function<void(ReferenceView&, std::size_t)> change_;
+};
+
+/// The notes of writing a film as `name`, or the error.
+std::vector<std::string> notesOf(std::function<void(ReferenceView&, std::size_t)> change,
+                                 const SaveOptions& options = {}, const char* name = "a.mp4") {
+    TemporaryFolder folder("losses");
+    Job job;
+    ChangedViews frames(std::move(change));
+    const auto saved = saveSequence(frames, folder / name, options, job);
+    if (!saved) return {"error: " + saved.error().text()};
+    return job.takeNotes();
+}
+bool anyHas(const std::vector<std::string>& notes, const std::string& text) {
+    return std::ranges::any_of(
+        notes, [&](const std::string& note) { return note.find(text) != std::string::npos; });
+}
+
+}  // namespace
+
+TEST(FilmLosses, AFilmThatLosesNothingHasNoNote) {
+    EXPECT_EQ(notesOf([](ReferenceView& view, std::size_t i) {
+                  if (i == 1) std::swap(view.depth.at(3, 3), view.depth.at(4, 4));
+              }),
+              std::vector<std::string>{});
+}
+
+TEST(FilmLosses, AProjectionThatChangesIsRefused) {
+    for (const char* name : {"a.mp4", "a.xmt"}) {
+        const auto notes =
+            notesOf([](ReferenceView& view, std::size_t i) { view.camera.orthographic = i == 1; },
+                    {}, name);
+        ASSERT_EQ(notes.size(), 1u) << name;
+        EXPECT_TRUE(anyHas(notes, "error: ") && anyHas(notes, "frame 1") &&
+                    anyHas(notes,
+                           "the camera is orthographic and was perspective before; in "
+                           "MPEG-4 a view keeps one projection for a whole film; write "
+                           ".exr"))
+            << notes[0];
+    }
+}
+
+TEST(FilmLosses, WhatMissingDepthIsInSomeFramesIsNoted) {
+    const auto change = [](ReferenceView& view, std::size_t i) {
+        view.depth.at(3, 3) = kNoDepth;
+        if (i != 1) (*view.texture.rgba8()).at(3, 3).a = 0;
+        view.noDepth = i == 1 ? NoDepth::unknown : NoDepth::empty;
+    };
+    EXPECT_TRUE(anyHas(notesOf(change),
+                       "missing depth is empty in some frames and unknown in others; in MPEG-4 it "
+                       "is unknown in all"));
+}
+
+TEST(FilmLosses, AlphaOfALaterFrameIsNoted) {
+    const auto change = [](ReferenceView& view, std::size_t i) {
+        if (i == 1) view.texture.rgba8()->at(5, 5).a = 128;
+    };
+    EXPECT_FALSE(anyHas(notesOf(change), "alpha"));
+    SaveOptions jpeg;
+    jpeg.jpegQuality = 90;
+    EXPECT_TRUE(anyHas(notesOf(change, jpeg), "JPEG has no alpha: soft edges"));
+    SaveOptions video;
+    video.h264 = 20;
+    EXPECT_TRUE(anyHas(notesOf(change, video), "H.264 has no alpha: soft edges"));
+    // A still picture stays a PNG, with its alpha.
+    EXPECT_FALSE(anyHas(notesOf(
+                            [](ReferenceView& view, std::size_t i) {
+                                view.texture.rgba8()->at(5, 5).a = 128;
+                                if (i == 1) std::swap(view.depth.at(3, 3), view.depth.at(4, 4));
+                            },
+                            video),
+                        "alpha"));
+}
+
+TEST(FilmLosses, LinearColourOfALaterFrameIsNoted) {
+    for (const float peak : {1.0f, 10.0f}) {
+        const auto change = [&](ReferenceView& view, std::size_t i) {
+            if (i == 1) view.texture = Texture(RgbaFloatImage(24, 16, {peak, 0.5f, 0.5f, 1.0f}));
+        };
+        for (const int h264 : {-1, 20}) {
+            SaveOptions options;
+            options.h264 = h264;
+            const auto notes = notesOf(change, options);
+            EXPECT_TRUE(anyHas(notes, "linear colour becomes 8-bit sRGB")) << h264;
+            EXPECT_EQ(anyHas(notes, "values above 1 are clipped"), peak > 1) << h264;
+        }
+    }
+}
+
+TEST(FilmLosses, DepthThatTheFilmsRangeRoundsIsNoted) {
+    const auto change = [](ReferenceView& view, std::size_t i) {
+        view.nearPlane = 1;
+        view.farPlane = i == 1 ? 10000 : 2;
+        const DepthCode code = view.depthCode();
+        for (std::size_t k = 0; k < view.depth.count(); ++k)
+            view.depth.data()[k] =
+                static_cast<float>(code.decode(100 * static_cast<std::uint32_t>(k) + 100));
+    };
+    const auto notes = notesOf(change);
+    ASSERT_EQ(notes.size(), 1u);
+    double off = 0;
+    ASSERT_EQ(
+        std::sscanf(notes[0].c_str(), "depth is rounded to 16 bits: at most %lf scene units", &off),
+        1)
+        << notes[0];
+    // Half of a step of the film.
+    EXPECT_LE(off, 0.5 * 9999 / 65534 * 1.001);
+    EXPECT_GE(off, 0.9 * 0.5 * 9999 / 65534);
+}
