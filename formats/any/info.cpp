@@ -399,7 +399,7 @@ Result<Json> describeNumbered(const fs::path& path, const InfoOptions& options, 
     out["bytes"] = bytes;
     addTime(out, frames->timeline());
     if (!out.contains("bounds") || files.size() < 2) return out;
-    Job quiet;  // openSequence() has told
+    Job quiet;  // openSequence() has said so
     quiet.workFor(job);
     STX_TRY(const auto bounds, boundsOfNumbered(path, quiet));
     if (bounds && options.object.empty())
