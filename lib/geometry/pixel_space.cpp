@@ -7,6 +7,10 @@ namespace {
 
 /// Of orthographic cameras: depth range in parts of the window's larger side.
 constexpr double kOrthographicRange = 1.2;
+/// A scene counts as no larger than so many windows: it may have a sky around what is looked at.
+/// Windows of a tenth of an object, which magnify its views ten times, are as large as the sweep
+/// has.
+constexpr double kMostAcross = 10;
 /// Shares of q that neighbouring pixels may differ by hold for pixels up to this share of their
 /// distance (a view of 64 pixels for 35 degrees) and grow with larger ones; else a ball in few
 /// pixels falls apart where it is steep. Of 150 random captures (tests/sweep) 14 have a quality
@@ -16,11 +20,12 @@ constexpr double kFinePixel = 1.0 / 100.0;
 
 }  // namespace
 
-PixelSpace::PixelSpace(const Camera& c, double farthest) : camera(c) {
+PixelSpace::PixelSpace(const Camera& c, double farthest, double across) : camera(c) {
     axis.inverse = !c.orthographic;
     if (c.orthographic) {
         // A depth range as wide as the window makes shares of it mean what they do in perspective.
-        axis.unit = kOrthographicRange * std::max(c.width / c.fx, c.height / c.fy);
+        const double window = std::max(c.width / c.fx, c.height / c.fy);
+        axis.unit = kOrthographicRange * std::clamp(across, window, kMostAcross * window);
         axis.origin = farthest + axis.unit;
     }
     axis.pixel = 1.0 / std::max(c.fx, c.fy);

@@ -248,7 +248,7 @@ SurfaceFrame planFrame(const SurfaceScene& scene, const Bounds& bounds, const Ef
             1e-6 * bounds.radius(),
             glm::dot(bounds.centre() - camera.position, camera.forward()) + bounds.radius());
     SurfaceFrame f;
-    f.space = PixelSpace(camera, farthest);
+    f.space = PixelSpace(camera, farthest, bounds.empty() ? 0.0 : bounds.radius());
     f.tiles = TileGrid(camera);
     f.effort = effort;
     for (const Source* s : sourcesBySide(scene, bounds, camera))
