@@ -319,6 +319,21 @@ void MeshBuilder::roundPositions() {
     positions_ = {};
 }
 
+/// A material that no triangle has is no colour of the model, and its maps need no coordinates: all
+/// primitives that have it may be drawn with a copy without maps, for lack of them.
+void MeshBuilder::dropUnusedTextures() {
+    std::vector<bool> used(mesh_.materials.size());
+    for (const auto m : mesh_.triangleMaterial)
+        if (m < used.size()) used[m] = true;
+    for (std::size_t i = 0; i < used.size(); ++i) {
+        auto& m = mesh_.materials[i];
+        if (used[i]) continue;
+        for (int* map : {&m.baseColourTexture, &m.emissiveTexture, &m.metallicRoughnessTexture,
+                         &m.normalTexture})
+            *map = -1;
+    }
+}
+
 Result<Mesh> MeshBuilder::finish() {
     if (!mesh_.triangles.empty() || !mesh_.points.empty()) {
         fillNormals();
@@ -345,6 +360,7 @@ Result<Mesh> MeshBuilder::finish() {
             ErrorCode::invalidInput,
             "the model has neither triangles nor points; export its faces or its vertices with it");
     }
+    dropUnusedTextures();
     STX_CHECK(mesh_.check());
     return std::move(mesh_);
 }

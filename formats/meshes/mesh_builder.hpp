@@ -60,6 +60,7 @@ class MeshBuilder {
     void dropBrokenPoints(MeshPart& part);
     void fillNormals();
     void roundPositions();
+    void dropUnusedTextures();
 
     Job& job_;
     Mesh mesh_;                          ///< its positions come at the end

@@ -249,9 +249,11 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
         m.normalScale = static_cast<float>(scale.value_or(1.0));
     }
     if (object->contains("occlusionTexture")) ++dropped["occlusion maps"];
-    STX_CHECK(readEmissive(*object, where, m, use));
     STX_TRY(const Json* unlit, getExtension(*object, "KHR_materials_unlit", where));
     m.unlit = unlit != nullptr;
+    // The colour of an unlit material is its base colour alone; what it emits is for programs that
+    // do not know the extension.
+    if (!unlit) STX_CHECK(readEmissive(*object, where, m, use));
     STX_TRY(const auto alphaMode, getString(*object, "alphaMode", where));
     if (alphaMode == "MASK") {
         m.alpha = Material::Alpha::mask;

@@ -343,6 +343,30 @@ TEST(Gltf, MapsHaveTheirOwnUvs) {
         << notes[0];
 }
 
+TEST(Gltf, UnlitMaterialsDoNotEmit) {
+    auto gltf = texturedQuad();
+    auto& material = gltf.root["materials"][0];
+    material["emissiveFactor"] = {1, 0, 0};
+    material["emissiveTexture"] = {{"index", 0}};
+    EXPECT_EQ(readGoodText(gltf.text(), "a.gltf").mesh.materials[0].emissive, glm::vec3(1, 0, 0));
+    material["extensions"]["KHR_materials_unlit"] = json::object();
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    EXPECT_TRUE(mesh.materials[0].unlit);
+    EXPECT_EQ(mesh.materials[0].emissive, glm::vec3(0));
+    EXPECT_EQ(mesh.materials[0].emissiveTexture, -1);
+}
+
+TEST(Gltf, TexturesWithoutAnyCoordinatesGiveThePlainColour) {
+    auto gltf = texturedQuad();
+    gltf.primitive()["attributes"].erase("TEXCOORD_0");
+    const auto model = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(model.mesh.triangles.size(), 2u);
+    EXPECT_EQ(model.mesh.materials.at(model.mesh.triangleMaterial[0]).baseColourTexture, -1);
+    ASSERT_EQ(model.notes.size(), 2u);
+    EXPECT_NE(model.notes[0].find("no texture coordinates for it"), std::string::npos);
+    EXPECT_NE(model.notes[1].find("no colour"), std::string::npos);
+}
+
 TEST(Gltf, WhatIsDroppedIsSaidInOneLine) {
     auto gltf = texturedQuad();
     gltf.root["animations"] = {{{"channels", json::array()}, {"samplers", json::array()}}};
