@@ -97,5 +97,59 @@ TEST_F(MovedModel, TheCallersTextureWins) {
     }
 }
 
+TEST_F(MovedModel, TheCallersTextureIsSampledAsTheOneThatItReplaces) {
+    using Wrap = MeshTexture::Wrap;
+    writePicture("mine.png", {7, 8, 9, 255});
+    GltfText text;
+    text.addQuad();
+    text.addTexture();
+    text.root["samplers"] = {{{"wrapS", 33648}, {"wrapT", 33071}, {"magFilter", 9728}}};
+    text.root["textures"][0]["sampler"] = 0;
+    text.primitive()["attributes"]["TEXCOORD_1"] =
+        text.accessor(std::vector<float>{0, 0, 0, 0, 4, 8, 0, 0}, 5126, "VEC2", 4);
+    text.root["materials"] = {
+        {{"pbrMetallicRoughness",
+          {{"baseColorTexture",
+            {{"index", 0},
+             {"texCoord", 1},
+             {"extensions", {{"KHR_texture_transform", {{"scale", {0.25, 0.5}}}}}}}}}},
+         {"emissiveFactor", {1, 1, 1}},
+         {"emissiveTexture", {{"index", 0}}}},
+        // Without a texture of its own, with a map that has other coordinates.
+        {{"emissiveFactor", {1, 1, 1}}, {"emissiveTexture", {{"index", 0}, {"texCoord", 1}}}}};
+    for (int i = 1; i < 4; ++i) {
+        auto more = text.primitive();
+        text.root["meshes"][0]["primitives"].push_back(std::move(more));
+    }
+    auto& primitives = text.root["meshes"][0]["primitives"];
+    primitives[0]["material"] = 0;
+    primitives[1]["material"] = 1;
+    primitives[2]["attributes"].erase("TEXCOORD_0");
+    const auto file = folder_ / "home/model/a.gltf";
+    std::ofstream(file) << text.text();
+
+    const auto [mesh, notes] = readGood(file, {folder_ / "mine.png"});
+    ASSERT_EQ(mesh.triangles.size(), 8u);
+    const auto materialOf = [&](std::size_t primitive) {
+        return mesh.materials.at(mesh.triangleMaterial[primitive * 2]);
+    };
+    const auto textureOf = [&](std::size_t primitive) {
+        return mesh.textures.at(static_cast<std::size_t>(materialOf(primitive).baseColourTexture));
+    };
+    for (const std::size_t primitive : {0, 1, 3})
+        EXPECT_EQ(textureOf(primitive).pixels.at(0, 0), glm::u8vec4(7, 8, 9, 255)) << primitive;
+    expectNear(mesh.uvs[2], {1, 4});
+    expectNear(mesh.emissiveUvs[2], {1, 1});
+    EXPECT_EQ(textureOf(0).wrapU, Wrap::mirror);
+    EXPECT_EQ(textureOf(0).wrapV, Wrap::clamp);
+    EXPECT_TRUE(textureOf(0).nearest);
+    expectNear(mesh.uvs[6], {1, 1});
+    expectNear(mesh.emissiveUvs[6], {4, 8});
+    EXPECT_EQ(textureOf(1).wrapU, Wrap::repeat);
+    EXPECT_EQ(materialOf(2).baseColourTexture, -1) << "it has no coordinates";
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("primitives[2] has a textured material but no"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace stx
