@@ -74,7 +74,8 @@ class MeshBuilder {
 /// Gives each vertex the normal of its triangle; a vertex of several unlike triangles is doubled.
 void addFlatNormals(MeshPart& part);
 
-/// Tangents from the uvs of the normal map (Lengyel's method); needs normals.
+/// Tangents from the uvs of the normal map (Lengyel's method); needs normals. Vertices at which
+/// mirrored uvs meet others are doubled.
 void addTangents(MeshPart& part);
 
 /// Merges vertices that are alike in every bit, in order of first use.

@@ -99,6 +99,38 @@ TEST(Gltf, NormalMapHasItsOwnUvs) {
     EXPECT_EQ(mesh.textures.size(), 1u);
 }
 
+TEST(Gltf, TangentsDoNotMixAcrossMirroredCoordinates) {
+    // Two quads with a common edge at x = 0, u = |x|, and shared vertices there.
+    GltfText gltf;
+    gltf.addTexture();
+    const int position =
+        gltf.accessor(std::vector<float>{-1, -1, 0, 0, -1, 0, 1, -1, 0, -1, 1, 0, 0, 1, 0, 1, 1, 0},
+                      5126, "VEC3", 6);
+    const int uv =
+        gltf.accessor(std::vector<float>{1, 1, 0, 1, 1, 1, 1, 0, 0, 0, 1, 0}, 5126, "VEC2", 6);
+    const int normal = gltf.accessor(
+        std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}, 5126, "VEC3", 6);
+    const int index = gltf.accessor(std::vector<std::uint16_t>{0, 1, 4, 0, 4, 3, 1, 2, 5, 1, 5, 4},
+                                    5123, "SCALAR", 12);
+    gltf.root["meshes"][0]["primitives"].push_back(
+        {{"attributes", {{"POSITION", position}, {"TEXCOORD_0", uv}, {"NORMAL", normal}}},
+         {"indices", index},
+         {"material", 0}});
+    gltf.root["materials"] = {{{"normalTexture", {{"index", 0}}}}};
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(mesh.triangles.size(), 4u);
+    EXPECT_EQ(mesh.positions.size(), 8u);
+    for (std::size_t i = 0; i < 4; ++i) {
+        const float side = i < 2 ? -1.0f : 1.0f;
+        for (int k = 0; k < 3; ++k) {
+            const auto v = mesh.triangles[i][k];
+            EXPECT_LT(glm::length(mesh.tangents.at(v) - glm::vec4(side, 0, 0, side)), 1e-6f);
+            EXPECT_GE(mesh.positions[v].x * side, 0.0f);
+            EXPECT_EQ(mesh.uvs[v].x, std::abs(mesh.positions[v].x));
+        }
+    }
+}
+
 TEST(Gltf, VertexColoursOfAllTypesAreTheSame) {
     const auto coloursWith = [](int type) {
         GltfText gltf;
