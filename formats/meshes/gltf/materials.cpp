@@ -288,6 +288,12 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
         m.normalScale = static_cast<float>(scale.value_or(1.0));
     }
     if (object->contains("occlusionTexture")) ++dropped["occlusion maps"];
+    STX_TRY(const Json* glass, getExtension(*object, "KHR_materials_transmission", where));
+    if (glass) {
+        STX_TRY(const auto factor, getNumber(*glass, "transmissionFactor",
+                                             where + ".extensions.KHR_materials_transmission"));
+        if (factor.value_or(0.0) > 0.0) ++dropped["transmission of materials"];
+    }
     STX_TRY(const Json* unlit, getExtension(*object, "KHR_materials_unlit", where));
     m.unlit = unlit != nullptr;
     // The colour of an unlit material is its base colour alone; what it emits is for programs that

@@ -411,6 +411,36 @@ TEST(Gltf, WhatIsDroppedIsSaidInOneLine) {
     EXPECT_EQ(model.notes[0], "dropped: animations (1), cameras (1), line primitives (1)");
 }
 
+TEST(Gltf, TransmissionAndMorphedColoursAreSaidToBeDropped) {
+    auto gltf = texturedQuad();
+    auto& glass = gltf.root["materials"][0]["extensions"]["KHR_materials_transmission"];
+    glass["transmissionFactor"] = 0.0;
+    gltf.root["extensionsRequired"] = {"KHR_materials_transmission"};
+    EXPECT_TRUE(readGoodText(gltf.text(), "a.gltf").notes.empty());
+    glass["transmissionFactor"] = 0.5;
+    const int accessor = gltf.primitive()["attributes"]["POSITION"];
+    gltf.primitive()["targets"] = {{{"COLOR_0", accessor}, {"TEXCOORD_0", accessor}},
+                                   {{"TEXCOORD_1", accessor}}};
+    gltf.root["meshes"][0]["weights"] = {1, 0};
+    const auto model = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(model.notes.size(), 1u);
+    EXPECT_EQ(model.notes[0],
+              "dropped: morphs of texture coordinates (1), morphs of vertex colours (1), "
+              "transmission of materials (1)");
+}
+
+TEST(Gltf, HiddenNodesAreLeftOut) {
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.root["extensionsRequired"] = {"KHR_node_visibility"};
+    gltf.root["nodes"] = json::parse(R"([
+        {"mesh": 0, "extensions": {"KHR_node_visibility": {"visible": true}}},
+        {"mesh": 0, "children": [2], "extensions": {"KHR_node_visibility": {"visible": false}}},
+        {"mesh": 0}])");
+    gltf.root["scenes"][0]["nodes"] = {0, 1};
+    EXPECT_EQ(readGoodText(gltf.text(), "a.gltf").mesh.triangles.size(), 2u);
+}
+
 TEST(Gltf, PrimitivesWithAndWithoutNormalsAndColoursMix) {
     GltfText gltf;
     gltf.addQuad();
