@@ -429,6 +429,17 @@ TEST(Gltf, TransmissionAndMorphedColoursAreSaidToBeDropped) {
               "transmission of materials (1)");
 }
 
+TEST(Gltf, IndicesInListsMayBeWrittenAsOthers) {
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.root["nodes"][0]["mesh"] = 0.0;
+    gltf.root["scenes"][0]["nodes"] = {0.0};
+    EXPECT_EQ(readGoodText(gltf.text(), "a.gltf").mesh.triangles.size(), 2u);
+    gltf.root["scenes"][0]["nodes"] = {0.5};
+    EXPECT_NE(readBadText(gltf.text(), "a.gltf").message.find("scenes[0].nodes[0]"),
+              std::string::npos);
+}
+
 TEST(Gltf, HiddenNodesAreLeftOut) {
     GltfText gltf;
     gltf.addQuad();
