@@ -366,6 +366,7 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
                 {"--colour"}, "jpeg is of MPEG-4 containers; .exr keeps colours as they are"));
         STX_CHECK(command.refuse({"--video"}, "is of MPEG-4 containers, not of .exr"));
         STX_CHECK(command.refuse({"--point-texture"}, "is of MPEG-4 containers, not of .exr"));
+        STX_CHECK(command.refuse({"--bifs-version"}, "is of MPEG-4 containers, not of .exr"));
     }
     STX_CHECK(checkEnvironmentOptions(o.environment, command));
     if (!o.frames.empty()) return convertFrames(o, program);

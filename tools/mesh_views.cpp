@@ -28,7 +28,7 @@ Result<ConvertSettings> settingsOf(const MeshViewOptions& o, Program& program) {
     s.fovRad = glm::radians(o.fovDeg);
     s.elevationRad = glm::radians(o.elevationDeg.value_or(15.0));
     if (!o.up.empty()) STX_SET(s.up, parseDirection(o.up, "--up"));
-    s.supersampling = o.supersampling;
+    if (o.supersampling) s.supersampling = *o.supersampling;
     s.depthBits = o.depthBits;
     s.meshNormals = o.normals == "mesh";
     s.materials = o.materials;
@@ -94,6 +94,8 @@ Result<ChosenViews> chooseMeshViews(const Mesh& mesh, const MeshViewOptions& o, 
     chosen.settings.names = namesOf(named);
     if (mesh.splats && !chosen.settings.up && chosen.settings.cameras.empty())
         noteSplatsUp(mesh.splats->up, program.job);
+    if (mesh.splats && o.supersampling)
+        program.job.note("--supersampling is not used: splats are drawn with one sample a pixel");
     STX_TRY(chosen.views, chooseViews(mesh, chosen.settings, program.job));
     if (chosen.views.selection) {
         sayChoice(chosen.views, program);

@@ -20,8 +20,8 @@ struct MeshViewOptions {
     std::string projection;  ///< empty: perspective, except the faces of a cube
     std::optional<double> elevationDeg;
     double fovDeg = 35.0;
-    std::optional<int> depthBits;  ///< nothing: 16, or what an image set has
-    int supersampling = 4;
+    std::optional<int> depthBits;      ///< nothing: 16, or what an image set has
+    std::optional<int> supersampling;  ///< nothing: 4
     std::string normals = "none";
     bool materials = false;
     std::string up;    ///< empty: Y, except of clouds of splats, see SplatCloud::up

@@ -30,7 +30,7 @@ void noteUnused(const Model& model, const RenderOptions& o, const Command& comma
     if (std::holds_alternative<Mesh>(model)) {
         note(command.given({"--mode", "--backend", "--device", "--pipeline", "--splat",
                             "--splat-coefficient", "--fill", "--match-colours", "--refine",
-                            "--without", "--explain"}),
+                            "--without", "--explain", "--quality"}),
              "a mesh is rasterised itself, on the processor");
         return;
     }

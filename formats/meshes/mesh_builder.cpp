@@ -75,6 +75,13 @@ void giveFaceNormals(std::vector<glm::dvec3>& positions, std::vector<glm::uvec3>
         if (n == kNoNormal) n = glm::vec3(0, 0, 1);
 }
 
+/// Twice the signed area of a triangle in its uvs: mirrored ones have the other sign.
+double uvArea(const std::vector<glm::vec2>& uvs, glm::uvec3 t) {
+    const auto d1 = glm::dvec2(uvs[t.y]) - glm::dvec2(uvs[t.x]);
+    const auto d2 = glm::dvec2(uvs[t.z]) - glm::dvec2(uvs[t.x]);
+    return d1.x * d2.y - d2.x * d1.y;
+}
+
 /// The uvs that textures have of their own, in a part and in the mesh.
 constexpr std::pair<std::vector<glm::vec2> MeshPart::*, std::vector<glm::vec2> Mesh::*> kOwnUvs[] =
     {{&MeshPart::normalUvs, &Mesh::normalUvs},
@@ -319,6 +326,21 @@ void MeshBuilder::roundPositions() {
     positions_ = {};
 }
 
+/// A material that no triangle has is no colour of the model, and its maps need no coordinates: all
+/// primitives that have it may be drawn with a copy without maps, for lack of them.
+void MeshBuilder::dropUnusedTextures() {
+    std::vector<bool> used(mesh_.materials.size());
+    for (const auto m : mesh_.triangleMaterial)
+        if (m < used.size()) used[m] = true;
+    for (std::size_t i = 0; i < used.size(); ++i) {
+        auto& m = mesh_.materials[i];
+        if (used[i]) continue;
+        for (int* map : {&m.baseColourTexture, &m.emissiveTexture, &m.metallicRoughnessTexture,
+                         &m.normalTexture})
+            *map = -1;
+    }
+}
+
 Result<Mesh> MeshBuilder::finish() {
     if (!mesh_.triangles.empty() || !mesh_.points.empty()) {
         fillNormals();
@@ -345,6 +367,7 @@ Result<Mesh> MeshBuilder::finish() {
             ErrorCode::invalidInput,
             "the model has neither triangles nor points; export its faces or its vertices with it");
     }
+    dropUnusedTextures();
     STX_CHECK(mesh_.check());
     return std::move(mesh_);
 }
@@ -361,16 +384,49 @@ void addFlatNormals(MeshPart& part) {
         });
 }
 
+namespace {
+
+/// Doubles the vertices where coordinates that are mirrored meet others: tangents of both would
+/// cancel out (MikkTSpace, which glTF 2.0 asks for, does not average them either).
+void splitAtMirrors(MeshPart& part, const std::vector<glm::vec2>& uvs) {
+    const auto count = part.positions.size();
+    constexpr auto kNone = std::numeric_limits<std::uint32_t>::max();
+    std::vector<signed char> turn(count, 0);  // of the first triangle at each vertex
+    std::vector<std::uint32_t> twin(count, kNone);
+    for (auto& t : part.triangles) {
+        const double det = uvArea(uvs, t);
+        if (det == 0) continue;
+        const signed char own = det < 0 ? -1 : 1;
+        for (int k = 0; k < 3; ++k) {
+            const auto v = t[k];
+            if (turn[v] == 0) turn[v] = own;
+            if (turn[v] == own) continue;
+            if (twin[v] == kNone) {
+                twin[v] = static_cast<std::uint32_t>(part.positions.size());
+                copyVertex(part.positions, v);
+                copyVertex(part.normals, v);
+                copyVertex(part.colours, v);
+                copyVertex(part.uvs, v);
+                for (const auto& [uvsOfMap, _] : kOwnUvs) copyVertex(part.*uvsOfMap, v);
+            }
+            t[k] = twin[v];
+        }
+    }
+}
+
+}  // namespace
+
 void addTangents(MeshPart& part) {
     const auto& uvs = part.normalUvs.empty() ? part.uvs : part.normalUvs;
     if (uvs.empty() || part.normals.empty()) return;
+    splitAtMirrors(part, uvs);
     std::vector<glm::dvec3> along(part.positions.size(), glm::dvec3(0)), across = along;
     for (const auto& t : part.triangles) {
         const auto p0 = part.positions[t.x];
         const auto e1 = part.positions[t.y] - p0, e2 = part.positions[t.z] - p0;
         const auto d1 = glm::dvec2(uvs[t.y]) - glm::dvec2(uvs[t.x]);
         const auto d2 = glm::dvec2(uvs[t.z]) - glm::dvec2(uvs[t.x]);
-        const double det = d1.x * d2.y - d2.x * d1.y;
+        const double det = uvArea(uvs, t);
         if (det == 0) continue;
         const auto du = (e1 * d2.y - e2 * d1.y) / det, dv = (e2 * d1.x - e1 * d2.x) / det;
         for (int k = 0; k < 3; ++k) {

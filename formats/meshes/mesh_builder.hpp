@@ -60,6 +60,7 @@ class MeshBuilder {
     void dropBrokenPoints(MeshPart& part);
     void fillNormals();
     void roundPositions();
+    void dropUnusedTextures();
 
     Job& job_;
     Mesh mesh_;                          ///< its positions come at the end
@@ -73,7 +74,8 @@ class MeshBuilder {
 /// Gives each vertex the normal of its triangle; a vertex of several unlike triangles is doubled.
 void addFlatNormals(MeshPart& part);
 
-/// Tangents from the uvs of the normal map (Lengyel's method); needs normals.
+/// Tangents from the uvs of the normal map (Lengyel's method); needs normals. Vertices at which
+/// mirrored uvs meet others are doubled.
 void addTangents(MeshPart& part);
 
 /// Merges vertices that are alike in every bit, in order of first use.

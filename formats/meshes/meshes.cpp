@@ -1,6 +1,7 @@
 #include "formats/meshes/meshes.hpp"
 
 #include <algorithm>
+#include <set>
 
 #include "formats/files/deflate.hpp"
 #include "formats/images/images.hpp"
@@ -97,16 +98,24 @@ std::filesystem::path textureBeside(const std::filesystem::path& model) {
     return found;
 }
 
-/// Gives every material this base colour texture.
+/// Gives every material this base colour texture; where readers kept places for it
+/// (ModelFiles::replacesColour()), those that have one.
 Result<void> addTexture(Mesh& mesh, const std::filesystem::path& path, Job& job) {
     STX_TRY(const auto bytes, readFile(path, job.limits));
     STX_TRY(auto pixels, within(fmt::format("'{}'", path.string()),
                                 decodeRgba8(bytes, path.filename().string(), job.limits)));
-    const int index = static_cast<int>(mesh.textures.size());
-    mesh.textures.push_back({std::move(pixels)});
-    for (auto& material : mesh.materials) {
-        material.baseColourTexture = index;
+    std::set<int> places;
+    for (const auto& material : mesh.materials)
+        if (material.baseColourTexture >= 0) places.insert(material.baseColourTexture);
+    if (places.empty()) {
+        const int index = static_cast<int>(mesh.textures.size());
+        mesh.textures.push_back({std::move(pixels)});
+        for (auto& material : mesh.materials) material.baseColourTexture = index;
+        return {};
     }
+    STX_CHECK(job.limits.checkAllocation(places.size() * pixels.count(), sizeof(glm::u8vec4),
+                                         "the copies of the texture"));
+    for (const int place : places) mesh.textures[static_cast<std::size_t>(place)].pixels = pixels;
     return {};
 }
 

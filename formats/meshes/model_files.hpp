@@ -42,7 +42,9 @@ class ModelFiles {
     [[nodiscard]] Result<std::filesystem::path> find(std::string_view name,
                                                      const std::string& alsoIn = {}) const;
 
-    /// Base colour textures of materials need not be opened: another one is put on all of them.
+    /// Base colour textures of materials need not be opened: another one is put on all of them. A
+    /// reader may give materials a texture of one pixel instead, which keeps how theirs is sampled;
+    /// then these get the other one, and no others do.
     [[nodiscard]] bool replacesColour() const { return replacesColour_; }
 
     /// Metallic-roughness is asked for.

@@ -40,4 +40,18 @@ struct PlyHeader {
 /// are held against the size of the file: each element takes its bytes.
 [[nodiscard]] Result<PlyHeader> readPlyHeader(ByteSpan file);
 
+/// "a, b" of the properties of an element that `isUsed` does not want, at most 6, and "…" for the
+/// rest; empty: all are used.
+template <class IsUsed>
+[[nodiscard]] std::string unusedProperties(const PlyElement& element, const IsUsed& isUsed) {
+    constexpr int kMostNamed = 6;
+    std::string names;
+    int count = 0;
+    for (const auto& p : element.properties) {
+        if (isUsed(p)) continue;
+        if (count++ < kMostNamed) names += (names.empty() ? "" : ", ") + p.name;
+    }
+    return count > kMostNamed ? names + ", …" : names;
+}
+
 }  // namespace stx

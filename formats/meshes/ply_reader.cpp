@@ -110,9 +110,10 @@ class PlyReader {
     }
 
   private:
+    static constexpr std::uint32_t kNoTexture = std::numeric_limits<std::uint32_t>::max();
     struct Face {
         std::uint32_t firstCorner = 0;  ///< in corners_
-        std::uint32_t texture = 0;
+        std::uint32_t texture = 0;      ///< of textureFiles, or kNoTexture
         glm::vec4 colour{1.0f};
     };
     struct Corner {
@@ -158,17 +159,16 @@ class PlyReader {
             files_.job().note(
                 "the file holds Gaussian splats: their centres are read as points of their mean "
                 "colour; size, direction, opacity and what depends on the view are dropped");
-        std::string names;
-        int count = 0;
-        for (const auto& p : element.properties) {
-            if (splats || roleOf(p, false) != Role::none) continue;
-            constexpr int kMostNamed = 6;
-            if (count++ < kMostNamed) names += (names.empty() ? "" : ", ") + p.name;
-        }
-        if (count > 0)
-            files_.job().note(fmt::format("dropped: PLY properties of vertices ({}{})", names,
-                                          count > 6 ? ", …" : ""));
-        const bool alpha = std::any_of(colours_.begin(), colours_.end(),
+        const auto names = unusedProperties(element, [&](const PlyProperty& p) {
+            return splats || roleOf(p, false) != Role::none;
+        });
+        if (!names.empty())
+            files_.job().note(fmt::format("dropped: PLY properties of vertices ({})", names));
+        noteAlpha(colours_);
+    }
+
+    void noteAlpha(const std::vector<glm::vec4>& colours) {
+        const bool alpha = std::any_of(colours.begin(), colours.end(),
                                        [](const glm::vec4& c) { return c.a < 1.0f; });
         if (alpha) files_.job().note("dropped: the alpha of PLY colours; all is opaque");
     }
@@ -245,8 +245,10 @@ class PlyReader {
                     STX_TRY(const double number, value(element, i, p.type));
                     if (role == Role::indices) indices.push_back(number);
                     if (role == Role::corners) cornerUvs.push_back(number);
-                    if (role == Role::texture && number >= 0 && number < 1e6)
-                        face.texture = static_cast<std::uint32_t>(number);
+                    // MeshLab says -1 of faces without one.
+                    if (role == Role::texture && number < 1e6)
+                        face.texture =
+                            number >= 0 ? static_cast<std::uint32_t>(number) : kNoTexture;
                     if (role >= Role::red && role <= Role::alpha) {
                         colour[static_cast<int>(role) - static_cast<int>(Role::red)] =
                             number / colourScale(p.type);
@@ -267,6 +269,8 @@ class PlyReader {
             }
             const bool withUvs = cornerUvs.size() == indices.size() * 2;
             hasCornerUvs_ = hasCornerUvs_ || withUvs;
+            if (!withUvs && uvs_.empty()) face.texture = kNoTexture;
+            hasPlainFaces_ = hasPlainFaces_ || face.texture == kNoTexture;
             face.firstCorner = static_cast<std::uint32_t>(corners_.size());
             for (std::size_t k = 0; k < indices.size(); ++k) {
                 STX_TRY(Corner corner, cornerAt(element, i, indices[k]));
@@ -287,7 +291,8 @@ class PlyReader {
             return fail(ErrorCode::invalidInput,
                         "{} {} uses vertex {}, but there are only {} vertices", element.name, i,
                         index, positions_.size());
-        return Corner{static_cast<std::uint32_t>(index)};
+        const auto vertex = static_cast<std::uint32_t>(index);
+        return Corner{vertex, uvs_.empty() ? glm::vec2(0.0f) : uvs_[vertex]};
     }
 
     /// Stanford's triangle strips: one list, -1 begins a new strip.
@@ -310,19 +315,30 @@ class PlyReader {
         return {};
     }
 
-    /// A material for each texture that the file names, or one.
+    /// A material for each texture that the file names, or one; behind them one for faces without a
+    /// texture, where others have one.
     Result<void> makeMaterials() {
         const bool hasUvs = !uvs_.empty() || hasCornerUvs_;
         if (!header_.textureFiles.empty() && !hasUvs)
             files_.job().note("the PLY file names a texture but has no texture coordinates for it");
         auto& materials = builder_.materials();
+        int place = -1;  // of the caller's texture
+        if (hasUvs && hasPlainFaces_ && files_.replacesColour()) {
+            place = 0;
+            builder_.textures().push_back({Rgba8Image(1, 1)});
+        }
         for (const auto& name : header_.textureFiles) {
-            Material m{.name = name, .hasColour = false};
+            Material m{.name = name, .baseColourTexture = place, .hasColour = false};
             if (hasUvs && !files_.replacesColour())
                 STX_SET(m.baseColourTexture, files_.textureFromFile(name, {}, builder_.textures()));
             materials.push_back(std::move(m));
         }
-        if (materials.empty()) materials.push_back({.name = "default", .hasColour = false});
+        if (materials.empty())
+            materials.push_back(
+                {.name = "default", .baseColourTexture = place, .hasColour = false});
+        textured_ = static_cast<std::uint32_t>(materials.size());
+        if (hasUvs && hasPlainFaces_)
+            materials.push_back({.name = "without texture", .hasColour = false});
         return {};
     }
 
@@ -347,10 +363,7 @@ class PlyReader {
                 part.colours.push_back(*faceColour);
             else if (!colours_.empty())
                 part.colours.push_back(colours_[v]);
-            if (hasCornerUvs_)
-                part.uvs.push_back(corners_[c].uv);
-            else if (!uvs_.empty())
-                part.uvs.push_back(uvs_[v]);
+            if (hasCornerUvs_ || !uvs_.empty()) part.uvs.push_back(corners_[c].uv);
         }
     }
 
@@ -365,6 +378,7 @@ class PlyReader {
         if (useFaceColours) {
             std::vector<glm::vec4> colours;
             for (const auto& f : faces_) colours.push_back(f.colour);
+            noteAlpha(colours);
             linearFromSrgbColours(colours, floatFaceColours_);
             for (std::size_t i = 0; i < faces_.size(); ++i) faces_[i].colour = colours[i];
         }
@@ -381,7 +395,8 @@ class PlyReader {
             for (auto c = face.firstCorner; c < end; ++c)
                 polygon.push_back(positions_[corners_[c].vertex]);
             triangulate(polygon, triangles);
-            auto& part = parts[std::min(face.texture, materials - 1)];
+            const auto last = face.texture == kNoTexture ? materials : textured_;
+            auto& part = parts[std::min(face.texture, last - 1)];
             const auto base = static_cast<std::uint32_t>(part.positions.size());
             for (const auto& t : triangles) {
                 if (shared)
@@ -420,7 +435,8 @@ class PlyReader {
     std::vector<glm::vec2> uvs_;
     std::vector<Face> faces_;
     std::vector<Corner> corners_;
-    bool hasCornerUvs_ = false, hasFaceColours_ = false;
+    bool hasCornerUvs_ = false, hasPlainFaces_ = false, hasFaceColours_ = false;
+    std::uint32_t textured_ = 0;  ///< materials that may have a texture
     bool floatColours_ = false, floatFaceColours_ = false;
     std::size_t shortFaces_ = 0;
 };

@@ -31,13 +31,35 @@ Texture straightTexture(const Image<glm::vec4>& premultiplied) {
     return texture;
 }
 
+/// Blended, and not opaque everywhere: by its factor, its texture or its vertices' colours.
+bool isTranslucent(const Mesh& mesh, std::size_t material) {
+    const Material& m = mesh.materials[material];
+    if (m.alpha != Material::Alpha::blend) return false;
+    if (m.baseColour.a < 1.0f) return true;
+    if (m.baseColourTexture >= 0) {
+        // What is there or not is a hole, not glass.
+        const auto& texture = mesh.textures[static_cast<std::size_t>(m.baseColourTexture)];
+        if (std::ranges::any_of(texture.pixels.pixels(),
+                                [](glm::u8vec4 p) { return p.a > 0 && p.a < 255; }))
+            return true;
+    }
+    if (mesh.colours.empty()) return false;
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        if (mesh.triangleMaterial[i] != material) continue;
+        const auto& t = mesh.triangles[i];
+        if (mesh.colours[t.x].a < 1.0f || mesh.colours[t.y].a < 1.0f || mesh.colours[t.z].a < 1.0f)
+            return true;
+    }
+    return false;
+}
+
 /// Says what becomes of glass: a view has one depth a pixel.
 void noteTranslucent(const Mesh& mesh, Job& job) {
     std::string first;
     int count = 0;
-    for (const auto& m : mesh.materials) {
-        if (m.alpha != Material::Alpha::blend || !(m.baseColour.a < 1.0f)) continue;
-        if (count++ == 0) first = m.name;
+    for (std::size_t i = 0; i < mesh.materials.size(); ++i) {
+        if (!isTranslucent(mesh, i)) continue;
+        if (count++ == 0) first = mesh.materials[i].name;
     }
     if (count == 0) return;
     job.note(fmt::format(

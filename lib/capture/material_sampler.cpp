@@ -130,10 +130,10 @@ glm::vec3 MaterialSampler::emissive(std::uint32_t triangle, glm::vec3 b) const {
 }
 
 glm::vec3 MaterialSampler::lit(const Lighting& lighting, std::uint32_t triangle, glm::vec3 b,
-                               glm::vec3 albedo, glm::vec3 position, glm::vec3 toEye) const {
+                               bool back, glm::vec3 albedo, glm::vec3 position,
+                               glm::vec3 toEye) const {
     if (mesh_.materials[mesh_.triangleMaterial[triangle]].unlit) return albedo;
-    glm::vec3 n = normal(triangle, b);
-    if (glm::dot(n, toEye) < 0.0f) n = -n;
+    const glm::vec3 n = normal(triangle, b, back);
     const glm::vec3 glow = glow_ == Glow::inColour ? emissive(triangle, b) : glm::vec3(0.0f);
     if (glow == glm::vec3(0.0f)) return shadePhong(lighting, albedo, position, n, toEye, false);
     const glm::vec3 bare(colour(triangle, b, Glow::apart));
@@ -162,10 +162,27 @@ bool MaterialSampler::opaqueAt(std::uint32_t triangle, glm::vec3 b) const {
     return m.alpha != Material::Alpha::mask || colour(triangle, b).w >= m.alphaCutoff;
 }
 
-glm::vec3 MaterialSampler::normal(std::uint32_t triangle, glm::vec3 b) const {
+glm::vec3 MaterialSampler::normal(std::uint32_t triangle, glm::vec3 b, bool back) const {
+    const glm::vec3 n = frontNormal(triangle, b);
+    return back != normalsBehind(triangle) ? -n : n;
+}
+
+glm::vec3 MaterialSampler::areaNormal(std::uint32_t triangle) const {
     const auto& t = mesh_.triangles[triangle];
-    glm::vec3 n = glm::cross(mesh_.positions[t.y] - mesh_.positions[t.x],
-                             mesh_.positions[t.z] - mesh_.positions[t.x]);
+    return glm::cross(mesh_.positions[t.y] - mesh_.positions[t.x],
+                      mesh_.positions[t.z] - mesh_.positions[t.x]);
+}
+
+bool MaterialSampler::normalsBehind(std::uint32_t triangle) const {
+    if (mesh_.normals.empty()) return false;
+    // Of all corners at once, so that a triangle has one front.
+    return glm::dot(areaNormal(triangle),
+                    mix3(mesh_.normals, mesh_.triangles[triangle], glm::vec3(1.0f))) < 0.0f;
+}
+
+glm::vec3 MaterialSampler::frontNormal(std::uint32_t triangle, glm::vec3 b) const {
+    const auto& t = mesh_.triangles[triangle];
+    glm::vec3 n = areaNormal(triangle);
     if (!mesh_.normals.empty()) {
         const glm::vec3 smooth = mix3(mesh_.normals, t, b);
         if (glm::dot(smooth, smooth) > 1e-12f) n = smooth;

@@ -31,10 +31,10 @@ class MaterialSampler {
     [[nodiscard]] glm::vec3 emissive(std::uint32_t triangle, glm::vec3 barycentric) const;
     /// What `lighting`, of the world, makes of `albedo`, the colour() there: shadePhong(), but that
     /// the light it gives off is added whatever falls on it, and an unlit material stays as it is.
-    /// `toEye` is unit.
+    /// `toEye` is unit, `back` as in normal().
     [[nodiscard]] glm::vec3 lit(const Lighting& lighting, std::uint32_t triangle,
-                                glm::vec3 barycentric, glm::vec3 albedo, glm::vec3 position,
-                                glm::vec3 toEye) const;
+                                glm::vec3 barycentric, bool back, glm::vec3 albedo,
+                                glm::vec3 position, glm::vec3 toEye) const;
     /// Whether the surface is there at all (alpha mask).
     [[nodiscard]] bool opaqueAt(std::uint32_t triangle, glm::vec3 barycentric) const;
     /// This triangle can have see-through points, so opaqueAt() must be asked.
@@ -61,11 +61,20 @@ class MaterialSampler {
     [[nodiscard]] const MeshTexture& texture(std::uint32_t triangle) const {
         return mesh_.textures[mesh_.materials[mesh_.triangleMaterial[triangle]].baseColourTexture];
     }
-    /// Unit world normal: interpolated, normal-mapped where the material says so; the geometric one
-    /// where the mesh has no normals; zero on triangles without area.
-    [[nodiscard]] glm::vec3 normal(std::uint32_t triangle, glm::vec3 barycentric) const;
+    /// Unit world normal of the side that is seen, `back` where corners turn clockwise there:
+    /// interpolated, normal-mapped where the material says so; the geometric one where the mesh has
+    /// no normals; zero on triangles without area. Normals that bend a surface may point away from
+    /// the eye (glTF 2.0, 3.9.2 reverses those of back faces only). Where the vertices' normals are
+    /// on the triangle's back, as in formats whose winding means nothing, that is its front.
+    [[nodiscard]] glm::vec3 normal(std::uint32_t triangle, glm::vec3 barycentric, bool back) const;
 
   private:
+    /// normal(), of the triangle's front.
+    [[nodiscard]] glm::vec3 frontNormal(std::uint32_t triangle, glm::vec3 barycentric) const;
+    /// Of its front by its winding; its length is twice the area.
+    [[nodiscard]] glm::vec3 areaNormal(std::uint32_t triangle) const;
+    /// The vertices' normals are on the triangle's back, most of them.
+    [[nodiscard]] bool normalsBehind(std::uint32_t triangle) const;
     [[nodiscard]] glm::vec4 colour(std::uint32_t triangle, glm::vec3 barycentric, Glow glow) const;
     /// The texture coordinates of a texture that may have some of its own.
     [[nodiscard]] const std::vector<glm::vec2>& uvsOr(const std::vector<glm::vec2>& own) const {

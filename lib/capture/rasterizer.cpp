@@ -54,6 +54,7 @@ struct SetUp {
     Affine edge[3];   ///< >= 0 inside; proportional to the perspective-correct barycentrics
     Affine nearness;  ///< perspective: 1/dist; orthographic: -dist
     std::uint32_t triangle = 0;
+    bool back = false;  ///< its back is seen
     PictureBounds box;
 };
 
@@ -169,6 +170,7 @@ bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out) const {
     // In pixels y runs down, so counter-clockwise front faces have a negative determinant.
     if (det > 0 && !mesh_.materials[mesh_.triangleMaterial[triangle]].doubleSided) return false;
     out.triangle = triangle;
+    out.back = det > 0;
 
     const glm::dvec3 e[3] = {first, glm::cross(v[2], v[0]), glm::cross(v[0], v[1])};
     const double sign = det > 0 ? 1.0 : -1.0;
@@ -333,7 +335,8 @@ glm::vec3 Rasterizer::lit(const Lighting& lighting, const SetUp& s, glm::vec3 al
     const glm::vec3 position(camera_.position +
                              camera_.orientation * camera_.unproject(x, y, dist));
     const glm::vec3 toEye = -glm::vec3(camera_.viewDirection(x, y));
-    return sampler_.lit(lighting, s.triangle, barycentric(s, x, y), albedo, position, toEye);
+    return sampler_.lit(lighting, s.triangle, barycentric(s, x, y), s.back, albedo, position,
+                        toEye);
 }
 
 /// Whether all samples of a pixel see the same triangle, or none.
@@ -513,10 +516,7 @@ void Rasterizer::resolveCentres(int tileX, int tileY, const Tile& tile, RasterIm
             if (!out.metallicRoughness.empty())
                 out.metallicRoughness.at(x, y) = sampler_.metallicRoughness(s.triangle, b);
             if (!out.emissive.empty()) out.emissive.at(x, y) = sampler_.emissive(s.triangle, b);
-            if (out.normal.empty()) continue;
-            glm::vec3 n = sampler_.normal(s.triangle, b);
-            const glm::vec3 view(camera_.viewDirection(x + 0.5, y + 0.5));
-            out.normal.at(x, y) = glm::dot(n, view) > 0.0f ? -n : n;
+            if (!out.normal.empty()) out.normal.at(x, y) = sampler_.normal(s.triangle, b, s.back);
         }
     }
 }

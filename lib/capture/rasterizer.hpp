@@ -23,7 +23,9 @@ struct RasterImage {
     Image<glm::vec4> colour;  ///< sRGB-coded, premultiplied by coverage (alpha), 0..1
     Image<glm::vec4> lit;     ///< the same under RasterSettings::lighting; empty when that is off
     Image<float> depth;       ///< planar distance; kNoDepth where the centre misses
-    Image<glm::vec3> normal;  ///< unit, world, towards the camera; zero where none; may be empty
+    /// Unit, world, of the side that is seen (MaterialSampler::normal()); zero where none; may be
+    /// empty.
+    Image<glm::vec3> normal;
     /// As in ReferenceView; empty unless asked for, and where no material of the mesh has them.
     Image<glm::vec2> metallicRoughness;
     Image<glm::vec3> emissive;

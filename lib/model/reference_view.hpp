@@ -119,7 +119,9 @@ struct ReferenceView : ViewHeader {
     Image<float> depth;  ///< planar distance in scene units; kNoDepth where there is no point
 
     /// SimpleTextureV2. Empty when absent; else one value per pixel, zero where there is no point.
-    Image<glm::vec3> normal;  ///< unit, in the world, towards the camera
+    /// Unit, in the world, towards the camera, but for those of bent or mapped surfaces that a mesh
+    /// has at rims and steep bumps.
+    Image<glm::vec3> normal;
     Image<glm::vec3> splatU;  ///< tangent vectors in the world, scene units: half axes of the splat
     Image<glm::vec3> splatV;
 

@@ -31,11 +31,12 @@ constexpr std::string_view kKnownExtensions[] = {
     "KHR_materials_specular",
     "KHR_materials_anisotropy",
     "KHR_materials_dispersion",
-    "KHR_materials_transmission",
+    "KHR_materials_transmission",  // not read: a note, and the surface is opaque
     "KHR_materials_volume",
     "KHR_materials_variants",
     "KHR_lights_punctual",
     "KHR_animation_pointer",
+    "KHR_node_visibility",
     "KHR_xmp_json_ld",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",

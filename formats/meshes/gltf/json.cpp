@@ -30,11 +30,19 @@ Result<std::optional<double>> getNumber(const Json& object, const char* key,
     return number;
 }
 
+namespace {
+
+bool isIndex(double number) {
+    return number >= 0 && number <= 9007199254740992.0 && std::floor(number) == number;
+}
+
+}  // namespace
+
 Result<std::optional<std::uint64_t>> getUint(const Json& object, const char* key,
                                              const std::string& where) {
     STX_TRY(const auto number, getNumber(object, key, where));
     if (!number) return std::nullopt;
-    if (!(*number >= 0) || *number > 9007199254740992.0 || std::floor(*number) != *number)
+    if (!isIndex(*number))
         return fail(ErrorCode::invalidInput, "{}.{} is {}, expected a whole number from 0", where,
                     key, *number);
     return static_cast<std::uint64_t>(*number);
@@ -93,9 +101,9 @@ Result<std::vector<std::uint64_t>> getIndices(const Json& object, const char* ke
     if (!array) return indices;
     for (std::size_t i = 0; i < array->size(); ++i) {
         const auto& v = (*array)[i];
-        if (!v.is_number_unsigned())
+        if (!v.is_number() || !isIndex(v.get<double>()))
             return fail(ErrorCode::invalidInput, "{}.{}[{}] is not an index", where, key, i);
-        indices.push_back(v.get<std::uint64_t>());
+        indices.push_back(static_cast<std::uint64_t>(v.get<double>()));
     }
     return indices;
 }

@@ -33,7 +33,7 @@ using Json = nlohmann::json;
 /// Fills exactly `values.size()` numbers; false when the member is absent.
 [[nodiscard]] Result<bool> getNumbers(const Json& object, const char* key, const std::string& where,
                                       std::span<double> values);
-/// An array of indices, empty when absent.
+/// An array of indices, which are as of getUint(); empty when absent.
 [[nodiscard]] Result<std::vector<std::uint64_t>> getIndices(const Json& object, const char* key,
                                                             const std::string& where);
 /// `root[list][index]`, which must exist and be an object; `user` names who refers to it.

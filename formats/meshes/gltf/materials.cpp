@@ -22,6 +22,10 @@ Result<MaterialUse> Materials::use(std::optional<std::uint64_t> index, const std
         result.index = static_cast<std::uint32_t>(builder_.materials().size());
         builder_.materials().push_back(
             {.name = "default", .doubleSided = false, .hasColour = false});
+        if (model_.files().replacesColour()) {
+            result.baseColour.used = true;
+            builder_.materials().back().baseColourTexture = placeOfColour({});
+        }
         if (model_.files().materials()) {
             builder_.materials().back().metallic = 1.0f;
             builder_.materials().back().hasMetallicRoughness = true;
@@ -103,7 +107,43 @@ Result<SamplerState> samplerOf(const Json& root, std::optional<std::uint64_t> sa
     return state;
 }
 
+/// The sampler of a texture.
+Result<SamplerState> samplerOfTexture(const Json& root, const Json& texture,
+                                      const std::string& where) {
+    STX_TRY(const auto sampler, getUint(texture, "sampler", where));
+    return samplerOf(root, sampler, where);
+}
+
 }  // namespace
+
+int Materials::placeOfColour(const SamplerState& state) {
+    const auto [it, isNew] = places_.try_emplace({state.wrapU, state.wrapV, state.nearest},
+                                                 static_cast<int>(builder_.textures().size()));
+    if (isNew)
+        builder_.textures().push_back({Rgba8Image(1, 1), state.wrapU, state.wrapV, state.nearest});
+    return it->second;
+}
+
+Result<void> Materials::readBaseColour(const Json* info, const std::string& where, Material& m,
+                                       MaterialUse& use) {
+    if (!model_.files().replacesColour()) {
+        if (info) STX_SET(m.baseColourTexture, texture(*info, where, use.baseColour));
+        return {};
+    }
+    SamplerState state;
+    if (info) {
+        STX_TRY(use.baseColour, uvSourceOf(*info, where));
+        STX_TRY(const auto index, getUint(*info, "index", where));
+        if (index) {
+            STX_TRY(const Json* object, element(model_.root(), "textures", *index, where));
+            STX_SET(state,
+                    samplerOfTexture(model_.root(), *object, fmt::format("textures[{}]", *index)));
+        }
+    }
+    use.baseColour.used = true;
+    m.baseColourTexture = placeOfColour(state);
+    return {};
+}
 
 Result<int> Materials::texture(const Json& info, const std::string& where, UvSource& uv) {
     STX_TRY(const auto index, getUint(info, "index", where));
@@ -111,8 +151,7 @@ Result<int> Materials::texture(const Json& info, const std::string& where, UvSou
     STX_TRY(uv, uvSourceOf(info, where));
     STX_TRY(const Json* object, element(model_.root(), "textures", *index, where));
     const auto textureWhere = fmt::format("textures[{}]", *index);
-    STX_TRY(const auto sampler, getUint(*object, "sampler", textureWhere));
-    STX_TRY(const SamplerState state, samplerOf(model_.root(), sampler, textureWhere));
+    STX_TRY(const SamplerState state, samplerOfTexture(model_.root(), *object, textureWhere));
     STX_TRY(const auto source, imageOf(*object, textureWhere));
     if (!source) return -1;
     STX_TRY(const int result, readImage(*source, textureWhere, state));
@@ -230,17 +269,17 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
     const auto baseWhere = where + (glossy ? ".extensions.KHR_materials_pbrSpecularGlossiness"
                                            : ".pbrMetallicRoughness");
     m.hasColour = false;
+    const char* key = glossy ? "diffuseTexture" : "baseColorTexture";
+    const Json* colour = nullptr;
     if (base) {
         glm::dvec4 factor(1.0);
         STX_CHECK(getNumbers(*base, glossy ? "diffuseFactor" : "baseColorFactor", baseWhere,
                              {&factor.x, 4}));
         m.baseColour = glm::vec4(factor);
         m.hasColour = base->contains(glossy ? "diffuseFactor" : "baseColorFactor");
-        const char* key = glossy ? "diffuseTexture" : "baseColorTexture";
-        STX_TRY(const Json* info, getObject(*base, key, baseWhere));
-        if (info && !model_.files().replacesColour())
-            STX_SET(m.baseColourTexture, texture(*info, baseWhere + "." + key, use.baseColour));
+        STX_SET(colour, getObject(*base, key, baseWhere));
     }
+    STX_CHECK(readBaseColour(colour, baseWhere + "." + key, m, use));
     STX_CHECK(readMetallicRoughness(base, glossy != nullptr, baseWhere, m, use));
     STX_TRY(const Json* normal, getObject(*object, "normalTexture", where));
     if (normal) {
@@ -249,9 +288,17 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
         m.normalScale = static_cast<float>(scale.value_or(1.0));
     }
     if (object->contains("occlusionTexture")) ++dropped["occlusion maps"];
-    STX_CHECK(readEmissive(*object, where, m, use));
+    STX_TRY(const Json* glass, getExtension(*object, "KHR_materials_transmission", where));
+    if (glass) {
+        STX_TRY(const auto factor, getNumber(*glass, "transmissionFactor",
+                                             where + ".extensions.KHR_materials_transmission"));
+        if (factor.value_or(0.0) > 0.0) ++dropped["transmission of materials"];
+    }
     STX_TRY(const Json* unlit, getExtension(*object, "KHR_materials_unlit", where));
     m.unlit = unlit != nullptr;
+    // The colour of an unlit material is its base colour alone; what it emits is for programs that
+    // do not know the extension.
+    if (!unlit) STX_CHECK(readEmissive(*object, where, m, use));
     STX_TRY(const auto alphaMode, getString(*object, "alphaMode", where));
     if (alphaMode == "MASK") {
         m.alpha = Material::Alpha::mask;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <tuple>
 
 #include "formats/meshes/gltf/gltf_file.hpp"
 
@@ -51,6 +52,11 @@ class Materials {
 
   private:
     [[nodiscard]] Result<MaterialUse> read(std::uint64_t index, const std::string& user);
+    /// `info` of the base colour's texture, null where there is none.
+    [[nodiscard]] Result<void> readBaseColour(const Json* info, const std::string& where,
+                                              Material& m, MaterialUse& use);
+    /// A texture whose pixels the caller's picture takes (ModelFiles::replacesColour()).
+    [[nodiscard]] int placeOfColour(const SamplerState& state);
     [[nodiscard]] Result<void> readEmissive(const Json& object, const std::string& where,
                                             Material& m, MaterialUse& use);
     [[nodiscard]] Result<void> readMetallicRoughness(const Json* base, bool glossy,
@@ -68,6 +74,7 @@ class Materials {
     MeshBuilder& builder_;
     std::map<std::int64_t, MaterialUse> known_;
     std::map<std::pair<std::uint32_t, TexturesKept>, std::uint32_t> plain_;
+    std::map<std::tuple<MeshTexture::Wrap, MeshTexture::Wrap, bool>, int> places_;
 };
 
 }  // namespace stx::gltf

@@ -139,7 +139,8 @@ std::vector<glm::uvec3> assemble(std::uint64_t mode, std::size_t count, const au
 }
 
 Result<void> applyMorph(GltfFile& model, const Json& primitive, const std::string& where,
-                        const std::vector<double>& weights, MeshPart& part) {
+                        const std::vector<double>& weights, MeshPart& part,
+                        std::map<std::string, int>& dropped) {
     STX_TRY(const Json* targets, getArray(primitive, "targets", where));
     if (!targets) return {};
     if (!weights.empty() && weights.size() != targets->size())
@@ -167,6 +168,10 @@ Result<void> applyMorph(GltfFile& model, const Json& primitive, const std::strin
         STX_CHECK(add("POSITION", part.positions));
         STX_CHECK(add("NORMAL", part.normals));
         STX_CHECK(add("TANGENT", part.tangents));
+        for (const auto& [name, _] : (*targets)[t].items()) {
+            if (name.starts_with("COLOR_")) ++dropped["morphs of vertex colours"];
+            if (name.starts_with("TEXCOORD_")) ++dropped["morphs of texture coordinates"];
+        }
     }
     return {};
 }
@@ -200,7 +205,7 @@ class PrimitiveReader {
         STX_CHECK(readOthers());
         STX_CHECK(readMaterial());
         STX_CHECK(readInfluences());
-        STX_CHECK(applyMorph(model_, primitive_, where_, morphWeights, part()));
+        STX_CHECK(applyMorph(model_, primitive_, where_, morphWeights, part(), dropped_));
         part().points = mode_ == 0;
         if (mode_ != 0) STX_CHECK(readTriangles());
         return std::move(result_);

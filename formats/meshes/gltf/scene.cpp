@@ -180,6 +180,9 @@ class SceneReader {
         while (!stack.empty()) {
             const auto visit = stack.back();
             stack.pop_back();
+            // What is below a hidden node is hidden, too.
+            STX_TRY(const bool hidden, isHidden(visit.node));
+            if (hidden) continue;
             order.push_back(visit);
             const auto& children = nodes_[visit.node].children;
             if (order.size() + stack.size() + children.size() > kMaxVisits)
@@ -192,6 +195,16 @@ class SceneReader {
                 stack.push_back({*it, visit.worldFromNode * nodes_[*it].parentFromNode});
         }
         return order;
+    }
+
+    Result<bool> isHidden(std::uint64_t node) {
+        const auto where = fmt::format("nodes[{}]", node);
+        STX_TRY(const Json* visibility,
+                getExtension(*nodes_[node].json, "KHR_node_visibility", where));
+        if (!visibility) return false;
+        STX_TRY(const auto visible,
+                getBool(*visibility, "visible", where + ".extensions.KHR_node_visibility"));
+        return !visible.value_or(true);
     }
 
     Result<void> readScene() {

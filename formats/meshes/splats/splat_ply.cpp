@@ -19,6 +19,20 @@ const PlyElement* verticesOf(const PlyHeader& header) {
     return nullptr;
 }
 
+/// Says what the file holds beside splats. Their normals mean nothing: INRIA's program writes
+/// zeros.
+void noteDropped(const PlyHeader& header, int rest, Job& job) {
+    const auto names = unusedProperties(*verticesOf(header), [&](const PlyProperty& p) {
+        const std::string_view n = p.name;
+        return std::ranges::find(kNeeded, n) != std::end(kNeeded) || n == "nx" || n == "ny" ||
+               n == "nz" || (n.starts_with("f_rest_") && rest > 0);
+    });
+    if (!names.empty()) job.note(fmt::format("dropped: PLY properties of vertices ({})", names));
+    for (const PlyElement& element : header.elements)
+        if (&element != verticesOf(header) && element.count > 0)
+            job.note(fmt::format("dropped: PLY elements '{}' ({})", element.name, element.count));
+}
+
 }  // namespace
 
 bool isSplatPly(const PlyHeader& header) {
@@ -98,6 +112,7 @@ Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job) {
             cloud.setHarmonic(i, k % coefficients, k / coefficients,
                               static_cast<float>(splat[atRest[k]]));
     }
+    noteDropped(header, rest, job);
     return meshOfSplats(std::move(cloud), job);
 }
 

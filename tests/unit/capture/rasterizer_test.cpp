@@ -107,6 +107,72 @@ TEST(Rasterise, TrianglesThatReachBehindTheCameraNeedNoClipping) {
     }
 }
 
+/// A square in z = 0 that faces +Z, and a normal map that bends its normal to (0.9, 0, 0.436).
+Mesh steepSquare() {
+    Mesh m;
+    m.materials.emplace_back();
+    m.positions = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+    m.normals.assign(4, {0, 0, 1});
+    m.tangents.assign(4, {1, 0, 0, 1});
+    m.uvs.assign(4, {0.5f, 0.5f});
+    m.triangles = {{0, 1, 2}, {0, 2, 3}};
+    m.triangleMaterial = {0, 0};
+    m.textures.push_back({Rgba8Image(1, 1, {242, 128, 183, 255})});
+    m.materials[0].normalTexture = 0;
+    return m;
+}
+
+TEST(Rasterise, NormalsAreOfTheSideThatIsSeenAlsoWhereTheyPointAway) {
+    Job job;
+    RasterSettings settings;
+    settings.normals = true;
+    Light light;
+    light.vector = {-1, 0, 0};
+    settings.lighting.lights = {light};
+    const auto look = [&](const Mesh& mesh, glm::dvec3 eye) {
+        auto image = rasterise(mesh, lookingAt(eye, 16), settings, job);
+        EXPECT_TRUE(image) << image.error().text();
+        return std::pair(image->normal.at(8, 8), image->lit.at(8, 8).x);
+    };
+    const glm::vec3 bent = glm::normalize(glm::vec3(242, 128, 183) / 127.5f - 1.0f);
+    // The bent normal points away from the first eye.
+    const glm::dvec3 left(-4, 0, 1.5), right(4, 0, 1.5), below(4, 0, -1.5);
+    ASSERT_LT(glm::dot(glm::dvec3(bent), left), 0.0);
+    Mesh mesh = steepSquare();
+    for (const bool wound : {true, false}) {
+        SCOPED_TRACE(wound);
+        for (const auto& eye : {left, right}) {
+            const auto [normal, brightness] = look(mesh, eye);
+            EXPECT_LT(glm::length(normal - bent), 1e-5f);
+            EXPECT_GT(brightness, 0.9f) << "the light falls on it from the right";
+        }
+        const auto [normal, brightness] = look(mesh, below);
+        EXPECT_LT(glm::length(normal + bent), 1e-5f) << "of a back face they are reversed";
+        EXPECT_LT(brightness, 0.6f);
+        // In formats where winding means nothing, the vertices' normals tell the front.
+        for (auto& t : mesh.triangles) std::swap(t.y, t.z);
+    }
+}
+
+TEST(Rasterise, SmoothNormalsOfACoarseSpherePointOutwardsUpToItsRim) {
+    Job job;
+    RasterSettings settings;
+    settings.normals = true;
+    const auto image = rasterise(sphereMesh(6), lookingAt({1, 2, 3}, 96), settings, job);
+    ASSERT_TRUE(image) << image.error().text();
+    const auto camera = lookingAt({1, 2, 3}, 96);
+    for (int y = 0; y < 96; ++y) {
+        for (int x = 0; x < 96; ++x) {
+            const float z = image->depth.at(x, y);
+            if (!hasPoint(z)) continue;
+            const glm::dvec3 p =
+                camera.position + camera.orientation * camera.unproject(x + 0.5, y + 0.5, z);
+            EXPECT_GT(glm::dot(image->normal.at(x, y), glm::vec3(glm::normalize(p))), 0.9f)
+                << x << ' ' << y;
+        }
+    }
+}
+
 TEST(Rasterise, BackFacesOfSingleSidedMaterialsAreOpen) {
     Mesh m = sphereMesh(16);
     m.materials[0].doubleSided = false;

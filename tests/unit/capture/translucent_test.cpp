@@ -145,5 +145,32 @@ TEST(Translucent, ReferenceViewsKeepAlphaAndTheNoteSaysSo) {
     EXPECT_TRUE(notes[0].starts_with("material 'm0' is translucent")) << notes[0];
 }
 
+TEST(Translucent, TheNoteSaysSoOfTexturesAndVertexColours) {
+    const auto notesOf = [](const Mesh& mesh) {
+        Job job;
+        const auto bundle = captureBundle(mesh, {above()}, {}, job);
+        EXPECT_TRUE(bundle) << bundle.error().text();
+        return job.takeNotes();
+    };
+    auto mesh = squares({{0, withAlpha(kRed, 1.0f)}});
+    mesh.materials[0].alpha = Material::Alpha::blend;
+    mesh.uvs.assign(mesh.positions.size(), glm::vec2(0.5f));
+    mesh.materials[0].baseColourTexture = 0;
+    for (const int alpha : {0, 255, 128}) {
+        MeshTexture texture;
+        texture.pixels = Rgba8Image(2, 2, {255, 255, 255, 255});
+        texture.pixels.at(1, 0).a = static_cast<std::uint8_t>(alpha);
+        mesh.textures = {texture};
+        EXPECT_EQ(notesOf(mesh).size(), alpha == 128 ? 1u : 0u) << alpha;
+    }
+    mesh.materials[0].baseColourTexture = -1;
+    mesh.colours.assign(mesh.positions.size(), glm::vec4(1));
+    EXPECT_TRUE(notesOf(mesh).empty());
+    mesh.colours[1].a = 0.5f;
+    const auto notes = notesOf(mesh);
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_TRUE(notes[0].starts_with("material 'm0' is translucent")) << notes[0];
+}
+
 }  // namespace
 }  // namespace stx

@@ -160,6 +160,17 @@ TEST(Ply, BigEndianIsRead) {
     EXPECT_EQ(mesh.positions[2], glm::vec3(0, -2, -1));
 }
 
+TEST(Ply, AlphaOfFacesIsSaidToBeDropped) {
+    const auto model = readGoodText(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+        "float z\nelement face 1\nproperty list uchar int vertex_indices\nproperty uchar red\n"
+        "property uchar green\nproperty uchar blue\nproperty uchar alpha\nend_header\n"
+        "0 0 0\n1 0 0\n1 1 0\n3 0 1 2 10 200 30 40\n",
+        "a.ply");
+    EXPECT_EQ(model.notes,
+              std::vector<std::string>{"dropped: the alpha of PLY colours; all is opaque"});
+}
+
 TEST(Ply, FaceColoursAndStrips) {
     const auto coloured = readGoodText(
         "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty "

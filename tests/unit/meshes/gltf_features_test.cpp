@@ -99,6 +99,38 @@ TEST(Gltf, NormalMapHasItsOwnUvs) {
     EXPECT_EQ(mesh.textures.size(), 1u);
 }
 
+TEST(Gltf, TangentsDoNotMixAcrossMirroredCoordinates) {
+    // Two quads with a common edge at x = 0, u = |x|, and shared vertices there.
+    GltfText gltf;
+    gltf.addTexture();
+    const int position =
+        gltf.accessor(std::vector<float>{-1, -1, 0, 0, -1, 0, 1, -1, 0, -1, 1, 0, 0, 1, 0, 1, 1, 0},
+                      5126, "VEC3", 6);
+    const int uv =
+        gltf.accessor(std::vector<float>{1, 1, 0, 1, 1, 1, 1, 0, 0, 0, 1, 0}, 5126, "VEC2", 6);
+    const int normal = gltf.accessor(
+        std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}, 5126, "VEC3", 6);
+    const int index = gltf.accessor(std::vector<std::uint16_t>{0, 1, 4, 0, 4, 3, 1, 2, 5, 1, 5, 4},
+                                    5123, "SCALAR", 12);
+    gltf.root["meshes"][0]["primitives"].push_back(
+        {{"attributes", {{"POSITION", position}, {"TEXCOORD_0", uv}, {"NORMAL", normal}}},
+         {"indices", index},
+         {"material", 0}});
+    gltf.root["materials"] = {{{"normalTexture", {{"index", 0}}}}};
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(mesh.triangles.size(), 4u);
+    EXPECT_EQ(mesh.positions.size(), 8u);
+    for (std::size_t i = 0; i < 4; ++i) {
+        const float side = i < 2 ? -1.0f : 1.0f;
+        for (int k = 0; k < 3; ++k) {
+            const auto v = mesh.triangles[i][k];
+            EXPECT_LT(glm::length(mesh.tangents.at(v) - glm::vec4(side, 0, 0, side)), 1e-6f);
+            EXPECT_GE(mesh.positions[v].x * side, 0.0f);
+            EXPECT_EQ(mesh.uvs[v].x, std::abs(mesh.positions[v].x));
+        }
+    }
+}
+
 TEST(Gltf, VertexColoursOfAllTypesAreTheSame) {
     const auto coloursWith = [](int type) {
         GltfText gltf;
@@ -343,6 +375,30 @@ TEST(Gltf, MapsHaveTheirOwnUvs) {
         << notes[0];
 }
 
+TEST(Gltf, UnlitMaterialsDoNotEmit) {
+    auto gltf = texturedQuad();
+    auto& material = gltf.root["materials"][0];
+    material["emissiveFactor"] = {1, 0, 0};
+    material["emissiveTexture"] = {{"index", 0}};
+    EXPECT_EQ(readGoodText(gltf.text(), "a.gltf").mesh.materials[0].emissive, glm::vec3(1, 0, 0));
+    material["extensions"]["KHR_materials_unlit"] = json::object();
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    EXPECT_TRUE(mesh.materials[0].unlit);
+    EXPECT_EQ(mesh.materials[0].emissive, glm::vec3(0));
+    EXPECT_EQ(mesh.materials[0].emissiveTexture, -1);
+}
+
+TEST(Gltf, TexturesWithoutAnyCoordinatesGiveThePlainColour) {
+    auto gltf = texturedQuad();
+    gltf.primitive()["attributes"].erase("TEXCOORD_0");
+    const auto model = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(model.mesh.triangles.size(), 2u);
+    EXPECT_EQ(model.mesh.materials.at(model.mesh.triangleMaterial[0]).baseColourTexture, -1);
+    ASSERT_EQ(model.notes.size(), 2u);
+    EXPECT_NE(model.notes[0].find("no texture coordinates for it"), std::string::npos);
+    EXPECT_NE(model.notes[1].find("no colour"), std::string::npos);
+}
+
 TEST(Gltf, WhatIsDroppedIsSaidInOneLine) {
     auto gltf = texturedQuad();
     gltf.root["animations"] = {{{"channels", json::array()}, {"samplers", json::array()}}};
@@ -353,6 +409,47 @@ TEST(Gltf, WhatIsDroppedIsSaidInOneLine) {
     const auto model = readGoodText(gltf.text(), "a.gltf");
     ASSERT_EQ(model.notes.size(), 1u);
     EXPECT_EQ(model.notes[0], "dropped: animations (1), cameras (1), line primitives (1)");
+}
+
+TEST(Gltf, TransmissionAndMorphedColoursAreSaidToBeDropped) {
+    auto gltf = texturedQuad();
+    auto& glass = gltf.root["materials"][0]["extensions"]["KHR_materials_transmission"];
+    glass["transmissionFactor"] = 0.0;
+    gltf.root["extensionsRequired"] = {"KHR_materials_transmission"};
+    EXPECT_TRUE(readGoodText(gltf.text(), "a.gltf").notes.empty());
+    glass["transmissionFactor"] = 0.5;
+    const int accessor = gltf.primitive()["attributes"]["POSITION"];
+    gltf.primitive()["targets"] = {{{"COLOR_0", accessor}, {"TEXCOORD_0", accessor}},
+                                   {{"TEXCOORD_1", accessor}}};
+    gltf.root["meshes"][0]["weights"] = {1, 0};
+    const auto model = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(model.notes.size(), 1u);
+    EXPECT_EQ(model.notes[0],
+              "dropped: morphs of texture coordinates (1), morphs of vertex colours (1), "
+              "transmission of materials (1)");
+}
+
+TEST(Gltf, IndicesInListsMayBeWrittenAsOthers) {
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.root["nodes"][0]["mesh"] = 0.0;
+    gltf.root["scenes"][0]["nodes"] = {0.0};
+    EXPECT_EQ(readGoodText(gltf.text(), "a.gltf").mesh.triangles.size(), 2u);
+    gltf.root["scenes"][0]["nodes"] = {0.5};
+    EXPECT_NE(readBadText(gltf.text(), "a.gltf").message.find("scenes[0].nodes[0]"),
+              std::string::npos);
+}
+
+TEST(Gltf, HiddenNodesAreLeftOut) {
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.root["extensionsRequired"] = {"KHR_node_visibility"};
+    gltf.root["nodes"] = json::parse(R"([
+        {"mesh": 0, "extensions": {"KHR_node_visibility": {"visible": true}}},
+        {"mesh": 0, "children": [2], "extensions": {"KHR_node_visibility": {"visible": false}}},
+        {"mesh": 0}])");
+    gltf.root["scenes"][0]["nodes"] = {0, 1};
+    EXPECT_EQ(readGoodText(gltf.text(), "a.gltf").mesh.triangles.size(), 2u);
 }
 
 TEST(Gltf, PrimitivesWithAndWithoutNormalsAndColoursMix) {

@@ -293,6 +293,25 @@ TEST(Splats, HarmonicsOfPlyAreChannelByChannel) {
     EXPECT_EQ(cloud.harmonics, wanted.harmonics);
 }
 
+TEST(Splats, WhatAPlyHasBesideSplatsIsSaidToBeDropped) {
+    std::string text = "ply\nformat ascii 1.0\nelement vertex 1\n";
+    for (const char* name :
+         {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0",
+          "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"})
+        text += fmt::format("property float {}\n", name);
+    const std::string values = "0 0 0 0 0 0 1 1 1 0 -3 -3 -3 1 0 0 0";
+    EXPECT_TRUE(readGoodText(text + "end_header\n" + values + "\n", "a.ply").notes.empty());
+    const auto model = readGoodText(text +
+                                        "property float filter_3D\nelement face 1\n"
+                                        "property list uchar int vertex_indices\nend_header\n" +
+                                        values + " 0.1\n3 0 0 0\n",
+                                    "a.ply");
+    EXPECT_TRUE(model.mesh.splats);
+    EXPECT_EQ(model.notes,
+              (std::vector<std::string>{"dropped: PLY properties of vertices (filter_3D)",
+                                        "dropped: PLY elements 'face' (1)"}));
+}
+
 TEST(Splats, HostilePlyIsAnErrorOrLeftOut) {
     EXPECT_NE(readBadText(splatPly(restOf(7), 1, 24), "a.ply").message.find("f_rest_"),
               std::string::npos);

@@ -97,5 +97,104 @@ TEST_F(MovedModel, TheCallersTextureWins) {
     }
 }
 
+TEST_F(MovedModel, TheCallersTextureIsSampledAsTheOneThatItReplaces) {
+    using Wrap = MeshTexture::Wrap;
+    writePicture("mine.png", {7, 8, 9, 255});
+    GltfText text;
+    text.addQuad();
+    text.addTexture();
+    text.root["samplers"] = {{{"wrapS", 33648}, {"wrapT", 33071}, {"magFilter", 9728}}};
+    text.root["textures"][0]["sampler"] = 0;
+    text.primitive()["attributes"]["TEXCOORD_1"] =
+        text.accessor(std::vector<float>{0, 0, 0, 0, 4, 8, 0, 0}, 5126, "VEC2", 4);
+    text.root["materials"] = {
+        {{"pbrMetallicRoughness",
+          {{"baseColorTexture",
+            {{"index", 0},
+             {"texCoord", 1},
+             {"extensions", {{"KHR_texture_transform", {{"scale", {0.25, 0.5}}}}}}}}}},
+         {"emissiveFactor", {1, 1, 1}},
+         {"emissiveTexture", {{"index", 0}}}},
+        // Without a texture of its own, with a map that has other coordinates.
+        {{"emissiveFactor", {1, 1, 1}}, {"emissiveTexture", {{"index", 0}, {"texCoord", 1}}}}};
+    for (int i = 1; i < 4; ++i) {
+        auto more = text.primitive();
+        text.root["meshes"][0]["primitives"].push_back(std::move(more));
+    }
+    auto& primitives = text.root["meshes"][0]["primitives"];
+    primitives[0]["material"] = 0;
+    primitives[1]["material"] = 1;
+    primitives[2]["attributes"].erase("TEXCOORD_0");
+    const auto file = folder_ / "home/model/a.gltf";
+    std::ofstream(file) << text.text();
+
+    const auto [mesh, notes] = readGood(file, {folder_ / "mine.png"});
+    ASSERT_EQ(mesh.triangles.size(), 8u);
+    const auto materialOf = [&](std::size_t primitive) {
+        return mesh.materials.at(mesh.triangleMaterial[primitive * 2]);
+    };
+    const auto textureOf = [&](std::size_t primitive) {
+        return mesh.textures.at(static_cast<std::size_t>(materialOf(primitive).baseColourTexture));
+    };
+    for (const std::size_t primitive : {0, 1, 3})
+        EXPECT_EQ(textureOf(primitive).pixels.at(0, 0), glm::u8vec4(7, 8, 9, 255)) << primitive;
+    expectNear(mesh.uvs[2], {1, 4});
+    expectNear(mesh.emissiveUvs[2], {1, 1});
+    EXPECT_EQ(textureOf(0).wrapU, Wrap::mirror);
+    EXPECT_EQ(textureOf(0).wrapV, Wrap::clamp);
+    EXPECT_TRUE(textureOf(0).nearest);
+    expectNear(mesh.uvs[6], {1, 1});
+    expectNear(mesh.emissiveUvs[6], {4, 8});
+    EXPECT_EQ(textureOf(1).wrapU, Wrap::repeat);
+    EXPECT_EQ(materialOf(2).baseColourTexture, -1) << "it has no coordinates";
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("primitives[2] has a textured material but no"), std::string::npos);
+}
+
+TEST_F(MovedModel, PlyFacesWithoutATextureAreNotPainted) {
+    writePicture("mine.png", {7, 8, 9, 255});
+    const std::string head =
+        "ply\nformat ascii 1.0\ncomment TextureFile beside.png\nelement vertex 4\n"
+        "property float x\nproperty float y\nproperty float z\nelement face 2\n"
+        "property list uchar int vertex_indices\nproperty list uchar float texcoord\n";
+    const std::string vertices = "end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+    // MeshLab's -1, a list without coordinates, and a last face like the first.
+    const std::string painted = "3 0 1 2 6 0 0 1 0 1 1";
+    for (const auto& [property, first, second] :
+         {std::tuple{"property int texnumber\n", painted + " 0\n", "3 0 2 3 6 0 0 0 0 0 0 -1\n"},
+          std::tuple{"", painted + "\n", "3 0 2 3 0\n"}}) {
+        const auto file = folder_ / "home/model/a.ply";
+        std::ofstream(file) << head << property << vertices << first << second;
+        for (const bool replaced : {false, true}) {
+            const auto [mesh, notes] =
+                readGood(file, {replaced ? folder_ / "mine.png" : std::filesystem::path()});
+            ASSERT_EQ(mesh.triangles.size(), 2u);
+            const auto textureOf = [&](std::size_t triangle) {
+                return mesh.materials.at(mesh.triangleMaterial[triangle]).baseColourTexture;
+            };
+            ASSERT_GE(textureOf(0), 0);
+            EXPECT_EQ(mesh.textures.at(static_cast<std::size_t>(textureOf(0))).pixels.at(0, 0).r,
+                      replaced ? 7 : 200);
+            EXPECT_EQ(textureOf(1), -1);
+            EXPECT_TRUE(notes.empty());
+        }
+    }
+}
+
+TEST_F(MovedModel, PlyFacesWithoutCoordinatesOfTheirCornersHaveThoseOfTheirVertices) {
+    const auto file = folder_ / "home/model/a.ply";
+    std::ofstream(file)
+        << "ply\nformat ascii 1.0\ncomment TextureFile beside.png\nelement vertex 4\n"
+           "property float x\nproperty float y\nproperty float z\nproperty float u\n"
+           "property float v\nelement face 2\nproperty list uchar int vertex_indices\n"
+           "property list uchar float texcoord\nend_header\n"
+           "0 0 0 0.5 0.75\n1 0 0 0.5 0.75\n1 1 0 0.5 0.75\n0 1 0 0.5 0.75\n"
+           "3 0 1 2 6 0 0 1 0 1 1\n3 0 2 3 0\n";
+    const auto [mesh, notes] = readGood(file);
+    ASSERT_EQ(mesh.triangles.size(), 2u);
+    expectNear(mesh.uvs.at(mesh.triangles[1].z), {0.5, 0.25});
+    EXPECT_GE(mesh.materials.at(mesh.triangleMaterial[1]).baseColourTexture, 0);
+}
+
 }  // namespace
 }  // namespace stx
