@@ -40,12 +40,12 @@ glm::vec3 rayOf(const Camera& c, int x, int y) {
     return {(x + 0.5 - c.cx) / c.fx, -(y + 0.5 - c.cy) / c.fy, -1.0};
 }
 
-// The tilt of a plane with the given normal in camera space, seen along `ray`.
-glm::vec2 slopeFromNormal(glm::vec3 n, glm::vec3 ray) {
+// The tilt of a plane with the given normal in camera space, seen along `ray`; none where it is
+// seen from behind: a normal that is bent for light says nothing of the surface then.
+std::optional<glm::vec2> slopeFromNormal(glm::vec3 n, glm::vec3 ray) {
     const float towards = glm::dot(n, ray);
-    // A normal that faces away says nothing of a surface that was seen.
-    if (!(towards < -1e-3f * glm::length(n))) return glm::vec2(0.0f);
-    return {-n.x / towards, n.y / towards};
+    if (!(towards < -1e-3f * glm::length(n))) return std::nullopt;
+    return glm::vec2(-n.x / towards, n.y / towards);
 }
 
 inline glm::vec3 normalFromSlope(glm::vec2 slope, glm::vec3 ray) {
@@ -259,7 +259,7 @@ void prepareRow(const Window& w, const glm::mat3& cameraFromWorld, int y, Normal
             const glm::vec3 v = cameraFromWorld * at(w.page.splatV);
             glm::vec3 n = glm::cross(u, v);
             if (glm::dot(n, ray) > 0) n = -n;
-            slope = slopeFromNormal(n, ray);
+            slope = slopeFromNormal(n, ray).value_or(glm::vec2(0.0f));
             // Area of the ellipse's parallelogram against that of a lattice cell's on the same
             // plane, whose half diagonals just close the lattice: half a cell.
             const auto spacing = camera.sampleSpacing(w.depth(x, y));
@@ -269,10 +269,10 @@ void prepareRow(const Window& w, const glm::mat3& cameraFromWorld, int y, Normal
             const float size =
                 std::sqrt(glm::length(glm::cross(u, v)) / std::max(0.5f * cell, 1e-30f));
             out.sizes[i] = static_cast<std::uint8_t>(std::clamp(size, 0.5f, 3.9f) * 64.0f);
-        } else if (hasNormal) {
-            slope = slopeFromNormal(cameraFromWorld * at(w.page.normal), ray);
         } else {
-            slope = slopeFromDepth(w, x, y, steps);
+            std::optional<glm::vec2> given;
+            if (hasNormal) given = slopeFromNormal(cameraFromWorld * at(w.page.normal), ray);
+            slope = given ? *given : slopeFromDepth(w, x, y, steps);
         }
         const Surroundings around = surroundings(w, x, y, steps);
         // Where a surface turns away its tilt runs off to infinity; a splat that followed it would
