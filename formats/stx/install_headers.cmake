@@ -5,7 +5,7 @@ cmake_policy(VERSION 3.25)
 
 function(room_of header result)
     # What stx.hpp takes of the folders below formats are options, but for the rules of validate.
-    string(REGEX REPLACE "^formats/(any/options[.]|imagesets/|yuv/).+$" "formats/options/" header ${header}.)
+    string(REGEX REPLACE "^formats/(any/[a-z_]*options[.]|imagesets/|yuv/).+$" "formats/options/" header ${header}.)
     string(REGEX REPLACE "^(formats/stx|formats|lib)/([a-z_]+)[/.].*$" "\\2" room ${header})
     set(${result} ${room} PARENT_SCOPE)
 endfunction()
