@@ -133,7 +133,7 @@ Result<int> makePanorama(const PanoramaOptions& options, const Command& command,
     STX_CHECK(checkTarget(o.output, program));
     const std::vector<std::filesystem::path> inputs(o.inputs.begin(), o.inputs.end());
     preloadCodecs(inputs[0]);
-    STX_TRY(const auto source, openPanoramaPictures(inputs, program.job));
+    STX_TRY(auto source, openPanoramaPictures(inputs, program.job));
     STX_TRY(auto found, alignPanorama(*source, o.settings, program.job));
     STX_TRY(auto panorama, composePanorama(*source, found, compose, program.job));
     std::vector<LeftOutPicture> leftOut;
@@ -148,18 +148,20 @@ Result<int> makePanorama(const PanoramaOptions& options, const Command& command,
     else
         STX_CHECK(writePanoramaInto(std::move(panorama), o.into, o.output, write, program.job));
     const double seconds = watch.seconds();
+    const auto report = reportOf(o, found, leftOut, size, *source, seconds);
+    const std::string pictures = counted(source->count(), "picture");
+    source.reset();  // which says what its pictures lost
     program.sayNotes();
     double across = 0;
     for (const PanoramaCamera& c : found.cameras)
         if (c.used && across == 0) across = 2 * std::atan(0.5 * c.size.x / c.focal) * kDegrees;
     program.say(fmt::format(
-        "{} → {} ({}), {} of {}, each {:.1f}° wide{}, within {:.2f} pixels{}, {}",
-        counted(source->count(), "picture"), std::filesystem::path(o.output).filename().string(),
-        humanBytes(bytesOf(o.output)), shape, found.used(), across,
-        found.closed ? ", all around" : "", found.rms,
+        "{} → {} ({}), {} of {}, each {:.1f}° wide{}, within {:.2f} pixels{}, {}", pictures,
+        std::filesystem::path(o.output).filename().string(), humanBytes(bytesOf(o.output)), shape,
+        found.used(), across, found.closed ? ", all around" : "", found.rms,
         leftOut.empty() ? "" : fmt::format(", left out {:.1f} dB", meanPsnr(leftOut)),
         humanSeconds(seconds)));
-    STX_CHECK(program.writeReport(reportOf(o, found, leftOut, size, *source, seconds)));
+    STX_CHECK(program.writeReport(report));
     return 0;
 }
 

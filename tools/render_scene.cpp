@@ -59,10 +59,10 @@ Result<SwayPose> swayPose(const CameraOptions& o, const Views& seen) {
 }
 
 /// Of a film: the pose of its first picture.
-Result<SwayPose> swayPose(const RenderOptions& o, Sequence& frames, const Job& job) {
+Result<SwayPose> swayPose(const RenderOptions& o, Sequence& frames, Job& job) {
     STX_TRY(const auto times, timesOf(o.time, frames.timeline()));
     Job quiet;  // the frame is read again when it is drawn, and says the same then
-    quiet.limits = job.limits;
+    quiet.workFor(job);
     STX_TRY(const auto bundle, frames.frame(frames.timeline().frameAt(times.front()), quiet));
     return swayPose(o.camera, bundle);
 }

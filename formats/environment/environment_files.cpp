@@ -132,9 +132,7 @@ bool isExrFile(ByteSpan head) {
 Rgba8Image codedPicture(const Texture& picture, Job& job) {
     bool clamped = false;
     auto coded = mpeg4::rgba8FromTexture(picture, clamped);
-    if (picture.isLinear())
-        job.note(clamped ? "linear colour becomes 8-bit sRGB; values above 1 are clipped"
-                         : "linear colour becomes 8-bit sRGB");
+    Rgba8Loss{.linear = picture.isLinear(), .clipped = clamped}.note(job);
     return coded;
 }
 

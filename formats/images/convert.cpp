@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <atomic>
 #include <string_view>
 #include <utility>
 
@@ -58,8 +59,22 @@ std::string toRec709(DecodedImage& image) {
     return std::exchange(image.primariesNote, {});
 }
 
-Image<glm::u8vec4> rgba8From(const DecodedImage& image) {
+void Rgba8Loss::add(const Rgba8Loss& other) {
+    bits = std::max(bits, other.bits);
+    linear = linear || other.linear;
+    clipped = clipped || other.clipped;
+}
+
+void Rgba8Loss::note(Job& job) const {
+    if (bits > 8) job.note(fmt::format("colour of {} bits is rounded to 8", bits));
+    if (linear)
+        job.note(clipped ? "linear colour becomes 8-bit sRGB; values above 1 are clipped"
+                         : "linear colour becomes 8-bit sRGB");
+}
+
+Image<glm::u8vec4> rgba8From(const DecodedImage& image, Rgba8Loss* loss) {
     Image<glm::u8vec4> out(image.width, image.height);
+    Rgba8Loss lost;
     const ColourChannels at = colourChannels(image);
     const int r = at.r, g = at.g, b = at.b, a = at.a;
     const auto pixel = [&](const auto* values, const auto& coded) {
@@ -96,12 +111,16 @@ Image<glm::u8vec4> rgba8From(const DecodedImage& image) {
         integers(v8->data(), 255);
     } else if (const auto* v16 = std::get_if<1>(&image.values)) {
         integers(v16->data(), 65535);
+        lost.bits = 16;
     } else {
         const auto to8 = [](float v) {
             return static_cast<std::uint8_t>(std::clamp(v, 0.0f, 1.0f) * 255.0f + 0.5f);
         };
+        std::atomic<bool> clipped = false;
         const auto colour = [&](float v, float alpha) {
             if (premultiplied && alpha > 0.0f) v /= alpha;
+            // Beyond what dividing by alpha rounds.
+            if (!(v <= 1.0f + 1e-6f) || v < 0.0f) clipped.store(true, std::memory_order_relaxed);
             return to8(image.linear ? srgbFromLinear(v) : v);
         };
         pixel(std::get<2>(image.values).data(),
@@ -110,7 +129,10 @@ Image<glm::u8vec4> rgba8From(const DecodedImage& image) {
                   return glm::u8vec4(colour(red, cover), colour(green, cover), colour(blue, cover),
                                      to8(cover));
               });
+        lost.linear = image.linear;
+        lost.clipped = clipped;
     }
+    if (loss) loss->add(lost);
     return out;
 }
 

@@ -94,8 +94,8 @@ ExifNotes readExifTiff(ByteSpan tiff) {
 }
 
 Result<Image<glm::u8vec4>> decodeUpright(ByteSpan bytes, std::string_view name,
-                                         const Limits& limits) {
-    STX_TRY(auto stored, decodeRgba8(bytes, name, limits));
+                                         const Limits& limits, Rgba8Loss* loss) {
+    STX_TRY(auto stored, decodeRgba8(bytes, name, limits, loss));
     return turnedUpright(std::move(stored), readExif(bytes).orientation);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "formats/files/files.hpp"
+#include "formats/images/images.hpp"
 #include "lib/base/image.hpp"
 
 namespace stx {
@@ -40,6 +41,7 @@ template <class T>
 
 /// decodeRgba8(), turned as the picture's EXIF says: as viewers show it.
 [[nodiscard]] Result<Image<glm::u8vec4>> decodeUpright(ByteSpan bytes, std::string_view name,
-                                                       const Limits& limits);
+                                                       const Limits& limits,
+                                                       Rgba8Loss* loss = nullptr);
 
 }  // namespace stx

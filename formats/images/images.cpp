@@ -40,10 +40,11 @@ Result<DecodedImage> readDirect(ImageReader& reader) {
     return image;
 }
 
-Result<Image<glm::u8vec4>> readDirectRgba8(ImageReader& reader, const Limits& limits) {
+Result<Image<glm::u8vec4>> readDirectRgba8(ImageReader& reader, const Limits& limits,
+                                           Rgba8Loss* loss) {
     if (!reader.givesRgba8()) {
         STX_TRY(const auto image, readDirect(reader));
-        return rgba8From(image);
+        return rgba8From(image, loss);
     }
     const ImageInfo& info = reader.info();
     const auto count = static_cast<std::uint64_t>(info.width) * info.height;
@@ -89,16 +90,16 @@ Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Li
     return at(name, **reader, limits, std::move(image));
 }
 
-Result<Image<glm::u8vec4>> decodeRgba8(ByteSpan bytes, std::string_view name,
-                                       const Limits& limits) {
+Result<Image<glm::u8vec4>> decodeRgba8(ByteSpan bytes, std::string_view name, const Limits& limits,
+                                       Rgba8Loss* loss) {
     if (bytes.empty() || isExr(bytes) || isOtherKind(bytes)) {
         STX_TRY(auto image, decodeImage(bytes, name, limits));
         (void)toRec709(image);
-        return rgba8From(image);
+        return rgba8From(image, loss);
     }
     const auto reader = openDirect(bytes, limits);
     if (!reader) return at<Image<glm::u8vec4>>(name, tl::unexpected(reader.error()));
-    auto image = readDirectRgba8(**reader, limits);
+    auto image = readDirectRgba8(**reader, limits, loss);
     return at(name, **reader, limits, std::move(image));
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -69,15 +70,45 @@ struct DecodedImage {
 /// a picture that has R, G and B; others stay. Gives a note of that; empty: nothing was to be done.
 [[nodiscard]] std::string toRec709(DecodedImage& image);
 
+/// What pictures lose as 8-bit sRGB.
+struct Rgba8Loss {
+    int bits = 8;          ///< of integers, the most: above 8 they are rounded
+    bool linear = false;   ///< linear light is coded
+    bool clipped = false;  ///< some of that is below 0, or more than 1e-6 above 1
+    void add(const Rgba8Loss& other);
+    void note(Job& job) const;
+};
+
+/// What pictures lose together, however often and from however many threads each is read. It is
+/// said when this is destroyed.
+class SharedRgba8Loss {
+  public:
+    /// `job` must outlive it.
+    explicit SharedRgba8Loss(Job& job) : job_(job) {}
+    ~SharedRgba8Loss() { loss_.note(job_); }
+    SharedRgba8Loss(const SharedRgba8Loss&) = delete;
+    SharedRgba8Loss& operator=(const SharedRgba8Loss&) = delete;
+    void add(const Rgba8Loss& loss) {
+        const std::lock_guard lock(mutex_);
+        loss_.add(loss);
+    }
+
+  private:
+    Job& job_;
+    std::mutex mutex_;
+    Rgba8Loss loss_;
+};
+
 /// The same as rgba8From(decodeImage()) with toRec709() between them; 8-bit PNG and JPEG are
-/// decoded into the result at once.
+/// decoded into the result at once. What is lost is added to `loss`, where that is given.
 [[nodiscard]] Result<Image<glm::u8vec4>> decodeRgba8(ByteSpan bytes, std::string_view name,
-                                                     const Limits& limits);
+                                                     const Limits& limits,
+                                                     Rgba8Loss* loss = nullptr);
 
 /// 8-bit sRGB RGBA with straight alpha of any decoded image (grey is spread, missing alpha is 255,
 /// 16 bits are rounded, linear floats are coded as sRGB, premultiplied colours divided). The size
-/// is that of the stored pixels.
-[[nodiscard]] Image<glm::u8vec4> rgba8From(const DecodedImage& image);
+/// is that of the stored pixels. What is lost is added to `loss`, where that is given.
+[[nodiscard]] Image<glm::u8vec4> rgba8From(const DecodedImage& image, Rgba8Loss* loss = nullptr);
 
 /// Float RGBA with straight alpha of any decoded image, in the image's own coding: integers / their
 /// maximum, floats as they are. Grey is spread, missing alpha is 1.

@@ -230,8 +230,9 @@ Result<SetDescription> describeFirst(const std::filesystem::path& path,
     return set;
 }
 
-/// Options for a moment of what moves: cameras of each by itself would tremble.
+/// Options for the moments of what moves: cameras of each by itself would tremble.
 ImageSetOptions ofMoment(ImageSetOptions options) {
+    options.roundingSaid = std::make_shared<std::atomic<bool>>(false);
     if (options.refine.of(RefineStep::poses) == RefineSwitch::automatic)
         options.refine.set(RefineStep::poses, false);
     return options;

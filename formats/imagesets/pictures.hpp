@@ -1,5 +1,7 @@
 #pragma once
 
+#include <atomic>
+
 #include "formats/files/files.hpp"
 #include "formats/imagesets/set_view.hpp"
 
@@ -10,9 +12,10 @@ struct StoredColour {
     Texture texture;
     bool alpha = false;
 };
-/// `deep`: see ImageSetOptions::deepColour.
+/// `deep`: see ImageSetOptions::deepColour, and `said` ImageSetOptions::roundingSaid.
 [[nodiscard]] Result<StoredColour> readColour(const PictureSource& source, const YuvColour& colour,
-                                              bool deep, Job& job);
+                                              bool deep, Job& job,
+                                              std::atomic<bool>* said = nullptr);
 
 /// The values of a depth or disparity image as they are stored, and their bits (32 = floats).
 struct StoredDepth {

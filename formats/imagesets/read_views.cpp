@@ -11,7 +11,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/origin.hpp"
 #include "lib/model/depth_values.hpp"
-#include "lib/model/srgb8.hpp"
+#include "lib/model/linear_views.hpp"
 #include "lib/registration/camera_moves.hpp"
 #include "lib/registration/disagreement.hpp"
 
@@ -184,17 +184,6 @@ void makeNamesUnique(std::vector<ReferenceView>& views) {
         for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", view.name, i);
         view.name = std::move(name);
     }
-}
-
-void makeLinear(ReferenceView& view) {
-    const Rgba8Image* coded = view.texture.rgba8();
-    if (!coded) return;
-    RgbaFloatImage floats(coded->width(), coded->height());
-    std::ranges::transform(coded->pixels(), floats.pixels().begin(), [](glm::u8vec4 c) {
-        return glm::vec4(linearFromSrgb8(c.r), linearFromSrgb8(c.g), linearFromSrgb8(c.b),
-                         static_cast<float>(c.a) / 255.0f);
-    });
-    view.texture = std::move(floats);
 }
 
 glm::dvec3 findOrigin(Bundle& bundle, const SetDescription& set, Job& job) {

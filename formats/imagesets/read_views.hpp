@@ -70,8 +70,6 @@ struct LoadedViews {
 void leaveOut(const LoadedViews& loaded, SetDescription& set, Job& job);
 /// Names become part and file names: each is there once.
 void makeNamesUnique(std::vector<ReferenceView>& views);
-/// Colours of 8 bits become floats, of which they come back.
-void makeLinear(ReferenceView& view);
 /// Decides on the origin of a set whose bounds are known: Bundle::origin and bounds, the cameras.
 /// What was subtracted from these.
 glm::dvec3 findOrigin(Bundle& bundle, const SetDescription& set, Job& job);

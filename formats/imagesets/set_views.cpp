@@ -11,6 +11,7 @@
 #include "formats/imagesets/read_views.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/model/depth_values.hpp"
+#include "lib/model/linear_views.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "lib/registration/disagreement_by_view.hpp"
 

@@ -12,8 +12,8 @@ namespace stx {
 /// Opens what `inputs` name as the pictures of a turning camera: files in any order, or one folder
 /// or pattern (`name_%04d.jpg`) of numbered ones. Turned upright by their EXIF orientation; focal
 /// lengths of EXIF are given. Some stay decoded, as far as a small part of the memory goes. Errors:
-/// io, invalidInput, of decoding only when a picture is asked for. A note when colours are rounded
-/// to 8 bits. `job` must outlive it.
+/// io, invalidInput, of decoding only when a picture is asked for. What the pictures lose as 8-bit
+/// sRGB is a note when it is destroyed. `job` must outlive it.
 [[nodiscard]] Result<std::unique_ptr<PictureSource>> openPanoramaPictures(
     const std::vector<std::filesystem::path>& inputs, Job& job);
 

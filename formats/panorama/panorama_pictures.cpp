@@ -21,6 +21,7 @@ class PictureFiles final : public PictureSource {
     PictureFiles(std::vector<fs::path> files, Job& job)
         : files_(std::move(files)),
           job_(job),
+          loss_(job),
           kept_(files_.size()),
           notes_(files_.size()),
           room_(job.limits.maxMemoryBytes / 8) {}
@@ -30,8 +31,6 @@ class PictureFiles final : public PictureSource {
         for (std::size_t k = 0; k < files_.size(); ++k) {
             STX_TRY(const auto bytes, readFile(files_[k], job_.limits));
             notes_[k] = readExif(bytes);
-            if (const auto info = probeImage(bytes); info && info->bits > 8)
-                job_.note("pictures of 16 bits are rounded to 8");
         }
         return {};
     }
@@ -47,7 +46,9 @@ class PictureFiles final : public PictureSource {
             if (!kept_[at].empty()) return kept_[at];
         }
         STX_TRY(const auto bytes, readFile(files_[at], job_.limits));
-        STX_TRY(Rgba8Image upright, decodeUpright(bytes, files_[at].string(), job_.limits));
+        Rgba8Loss loss;
+        STX_TRY(Rgba8Image upright, decodeUpright(bytes, files_[at].string(), job_.limits, &loss));
+        loss_.add(loss);
         constexpr int kLeastSide = 32;
         if (std::min(upright.width(), upright.height()) < kLeastSide)
             return failAt(inQuotes(files_[at].string()), ErrorCode::invalidInput,
@@ -65,6 +66,7 @@ class PictureFiles final : public PictureSource {
   private:
     std::vector<fs::path> files_;
     Job& job_;
+    SharedRgba8Loss loss_;
     std::mutex mutex_;
     std::vector<Rgba8Image> kept_;
     std::vector<ExifNotes> notes_;

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 class PictureFrames final : public VideoFrames {
   public:
     PictureFrames(std::vector<fs::path> files, std::string what, Job& job)
-        : files_(std::move(files)), what_(std::move(what)), job_(job) {}
+        : files_(std::move(files)), what_(std::move(what)), job_(job), loss_(job) {}
 
     /// Takes the size from the first picture that can be read; not further on when `strict`.
     Result<void> open(bool strict) {
@@ -50,22 +50,28 @@ class PictureFrames final : public VideoFrames {
     }
 
   private:
-    [[nodiscard]] Result<Rgba8Image> read(std::size_t k) const {
+    [[nodiscard]] Result<Rgba8Image> read(std::size_t k) {
         const auto& file = files_[k];
         STX_TRY(const auto bytes, readFile(file, job_.limits));
-        return decodeRgba8(bytes, file.string(), job_.limits);
+        Rgba8Loss loss;
+        STX_TRY(auto picture, decodeRgba8(bytes, file.string(), job_.limits, &loss));
+        loss_.add(loss);
+        return picture;
     }
 
     std::vector<fs::path> files_;
     std::string what_;
     Job& job_;
+    SharedRgba8Loss loss_;
     glm::ivec2 size_{0};
 };
 
 class Y4mFrames final : public VideoFrames {
   public:
     Y4mFrames(Y4mReader reader, fs::path file, Job& job)
-        : reader_(std::move(reader)), file_(std::move(file)), job_(job) {}
+        : reader_(std::move(reader)), file_(std::move(file)), job_(job), loss_(job) {
+        loss_.add({.bits = reader_.bits()});
+    }
 
     [[nodiscard]] glm::ivec2 size() const override { return {reader_.width(), reader_.height()}; }
     [[nodiscard]] int count() const override { return reader_.count(); }
@@ -87,12 +93,13 @@ class Y4mFrames final : public VideoFrames {
     Y4mReader reader_;
     fs::path file_;
     Job& job_;
+    SharedRgba8Loss loss_;
 };
 
 class FilmFrames final : public VideoFrames {
   public:
     FilmFrames(std::unique_ptr<Film> film, int track, Job& job)
-        : film_(std::move(film)), job_(job) {
+        : film_(std::move(film)), job_(job), loss_(job) {
         const Film::Track& of = film_->tracks()[track];
         size_ = {of.width, of.height};
     }
@@ -102,6 +109,7 @@ class FilmFrames final : public VideoFrames {
     [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
         STX_TRY(const auto picture, film_->picture(k));
         noteOfColours(picture);
+        loss_.add({.bits = picture.bits()});
         STX_TRY(auto colour, within(place(k), picture.colour(job_.limits)));
         return std::make_shared<const Rgba8Image>(std::move(colour));
     }
@@ -125,6 +133,7 @@ class FilmFrames final : public VideoFrames {
 
     std::unique_ptr<Film> film_;
     Job& job_;
+    SharedRgba8Loss loss_;
     std::atomic<bool> noted_ = false;
     glm::ivec2 size_{0};
 };

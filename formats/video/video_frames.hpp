@@ -27,7 +27,8 @@ class VideoFrames : public StillFrames {
 /// invalidInput, and (unsupported) compressed video where the module of video is not, with how to
 /// take the frames out of it. `job` must outlive the frames. A frame that is damaged is the one
 /// before it that is not, or the one after, and a note counts them when the frames are destroyed;
-/// an error when `strict`, when all are, and of frames of another size.
+/// an error when `strict`, when all are, and of frames of another size. What the frames that were
+/// read lose as 8-bit sRGB is a note then, too.
 [[nodiscard]] Result<std::unique_ptr<VideoFrames>> openVideoFrames(
     const std::vector<std::filesystem::path>& inputs, Job& job, bool strict = false);
 

@@ -24,6 +24,7 @@ class Y4mReader {
 
     [[nodiscard]] int width() const { return format_.width; }
     [[nodiscard]] int height() const { return format_.height; }
+    [[nodiscard]] int bits() const { return format_.bits; }  ///< of a sample, 8 to 16
     [[nodiscard]] int count() const { return static_cast<int>(frames_.size()); }
     /// One frame as 8-bit RGB, opaque. From several threads. Errors: io; values beyond the bits;
     /// memory over the limit.

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "lib/background/moving_cameras.hpp"
+#include "lib/model/linear_views.hpp"
 #include "lib/render/scene/page_set.hpp"
 
 namespace stx {
@@ -45,15 +46,11 @@ std::string backgroundName(const std::string& name, std::set<std::string>& taken
     return own;
 }
 
-}  // namespace
-
-Result<std::vector<BackgroundModel>> rememberBackgrounds(std::span<const double> times,
-                                                         const FrameReader& read,
-                                                         const TemporalBackgroundSettings& settings,
-                                                         Job& job) {
-    if (times.empty())
-        return fail(ErrorCode::invalidInput,
-                    "the sequence has no frames; a background is made of at least two");
+/// rememberBackgrounds() of frames, at least one, whose colours are of one kind.
+Result<std::vector<BackgroundModel>> rememberOneKind(std::span<const double> times,
+                                                     const FrameReader& read,
+                                                     const TemporalBackgroundSettings& settings,
+                                                     Job& job) {
     std::vector<CameraBackground> cameras;
     int passes = 1;
     std::set<std::string> names;
@@ -117,6 +114,33 @@ Result<std::vector<BackgroundModel>> rememberBackgrounds(std::span<const double>
     return models;
 }
 
+}  // namespace
+
+Result<std::vector<BackgroundModel>> rememberBackgrounds(std::span<const double> times,
+                                                         const FrameReader& read,
+                                                         const TemporalBackgroundSettings& settings,
+                                                         Job& job) {
+    if (times.empty())
+        return fail(ErrorCode::invalidInput,
+                    "the sequence has no frames; a background is made of at least two");
+    // Which kinds there are shows while frames are read; linear light holds both.
+    bool anyLinear = false, anyCoded = false;
+    const FrameReader oneKind = [&](std::size_t frame, Job& part) -> Result<Bundle> {
+        const bool known = anyLinear && anyCoded;
+        STX_TRY(Bundle bundle, read(frame, part));
+        for (const ReferenceView& view : bundle.views)
+            if (!view.background) (view.texture.isLinear() ? anyLinear : anyCoded) = true;
+        if (!anyLinear || !anyCoded) return bundle;
+        if (!known) return fail(ErrorCode::failed, "colours are of two kinds");
+        std::ranges::for_each(bundle.views, makeLinear);
+        return bundle;
+    };
+    auto found = rememberOneKind(times, oneKind, settings, job);
+    // Those before were taken as they are, so that all are taken again.
+    if (!found && anyLinear && anyCoded) found = rememberOneKind(times, oneKind, settings, job);
+    return found;
+}
+
 std::unique_ptr<Sequence> withBackgrounds(std::unique_ptr<Sequence> frames,
                                           std::vector<BackgroundModel> backgrounds) {
     auto added = std::make_shared<Bundle>();
@@ -125,6 +149,9 @@ std::unique_ptr<Sequence> withBackgrounds(std::unique_ptr<Sequence> frames,
     return changed(std::move(frames), [added, more](Bundle& frame, Job&) -> Result<void> {
         std::erase_if(frame.views, [](const ReferenceView& view) { return view.background; });
         frame.views.insert(frame.views.end(), added->views.begin(), added->views.end());
+        const auto linear = [](const ReferenceView& view) { return view.texture.isLinear(); };
+        if (std::ranges::any_of(frame.views, linear))
+            std::ranges::for_each(frame.views, makeLinear);
         if (frame.bounds && !more.empty()) {
             frame.bounds->add(more.min);
             frame.bounds->add(more.max);

@@ -18,13 +18,15 @@ using FrameReader = std::function<Result<Bundle>(std::size_t frame, Job& job)>;
 /// paths (temporal::rememberMovingCameras()). Frames are read one after another, the whole
 /// sequence as often as the memory allowed makes it necessary (TemporalBackground). `times`:
 /// seconds, rising, one for each frame. Cameras whose background was never seen get none, with a
-/// note. Errors: no frames, a sequence whose views change, what reading gives.
+/// note. Where some colours are 8-bit sRGB and others linear, all become linear light. Errors: no
+/// frames, a sequence whose views change, what reading gives.
 [[nodiscard]] Result<std::vector<BackgroundModel>> rememberBackgrounds(
     std::span<const double> times, const FrameReader& read,
     const TemporalBackgroundSettings& settings, Job& job);
 
 /// The frames with one more view for each background, the same in all frames. Backgrounds that
-/// they had are left out.
+/// they had are left out. With linear backgrounds all views become linear, as those of a bundle
+/// are of one kind.
 [[nodiscard]] std::unique_ptr<Sequence> withBackgrounds(std::unique_ptr<Sequence> frames,
                                                         std::vector<BackgroundModel> backgrounds);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "formats/images/images.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mapping/view_notes.hpp"
 
@@ -74,9 +75,7 @@ void PictureLoss::add(std::size_t i, const ViewHeader& view, int bits, const Vie
 
 void PictureLoss::note(const SceneWriteOptions& options, Job& job) const {
     depth.note(job);
-    if (linear)
-        job.note(clamped ? "linear colour becomes 8-bit sRGB; values above 1 are clipped"
-                         : "linear colour becomes 8-bit sRGB");
+    Rgba8Loss{.linear = linear, .clipped = clamped}.note(job);
     if (options.texture == SceneWriteOptions::Texture::jpeg && !options.pointTexture)
         job.note(fmt::format("colour is JPEG of quality {}, which is lossy", options.jpegQuality));
     if (coverage)

@@ -4,6 +4,7 @@
 
 #include "lib/background/sequence_background.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/model/linear_views.hpp"
 #include "tests/wall_with_block.hpp"
 
 namespace stx {
@@ -265,6 +266,48 @@ TEST(RememberBackgrounds, OfEachCamera) {
     const auto changed = rememberBackgrounds(times, fewer, {}, job);
     ASSERT_FALSE(changed);
     EXPECT_EQ(changed.error().text(), "frame 3: there are 2 views where the first frame has 3");
+}
+
+TEST(RememberBackgrounds, OfFramesOfBothKindsOfColourAreThoseOfLinearLight) {
+    // The first camera stands still, the second moves.
+    const auto film = [](const std::function<bool(std::size_t frame)>& linear) {
+        return [linear](std::size_t frame, Job&) -> Result<Bundle> {
+            const int i = static_cast<int>(frame);
+            Bundle bundle;
+            bundle.views = {wallWithBlock(i, i + 12, 2.0f), wallWithBlock(i, i + 12, 2.0f)};
+            bundle.views[1].name = "hand held";
+            bundle.views[1].camera.position.x = i / 8 * kWall / bundle.views[1].camera.fx;
+            if (linear(frame)) std::ranges::for_each(bundle.views, makeLinear);
+            return bundle;
+        };
+    };
+    std::vector<double> times;
+    for (int i = 0; i < 20; ++i) times.push_back(i * 0.04);
+    Job job;
+    const auto expected = rememberBackgrounds(times, film([](auto) { return true; }), {}, job);
+    ASSERT_TRUE(expected) << expected.error().text();
+    ASSERT_GE(expected->size(), 2u);
+    const std::function<bool(std::size_t)> kinds[] = {[](auto frame) { return frame > 0; },
+                                                      [](auto frame) { return frame != 7; },
+                                                      [](auto frame) { return frame == 19; }};
+    for (const auto& kind : kinds) {
+        const auto found = rememberBackgrounds(times, film(kind), {}, job);
+        ASSERT_TRUE(found) << found.error().text();
+        ASSERT_EQ(found->size(), expected->size());
+        for (std::size_t k = 0; k < found->size(); ++k) {
+            EXPECT_TRUE((*found)[k].view.texture.isLinear());
+            EXPECT_EQ((*found)[k].view.texture, (*expected)[k].view.texture);
+            EXPECT_EQ((*found)[k].view.depth, (*expected)[k].view.depth);
+        }
+    }
+    // An error of reading stays what it is.
+    const auto broken = [&](std::size_t frame, Job& part) -> Result<Bundle> {
+        if (frame == 9) return fail(ErrorCode::io, "gone");
+        return film(kinds[0])(frame, part);
+    };
+    const auto failed = rememberBackgrounds(times, broken, {}, job);
+    ASSERT_FALSE(failed);
+    EXPECT_EQ(failed.error().text(), "gone");
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/video/numbered_pictures.hpp"
 #include "formats/video/video_process.hpp"
@@ -114,6 +115,40 @@ TEST(VideoFrames, TheFrameBeforeADamagedOneStandsForIt) {
     EXPECT_TRUE(has(notes[0], "2 of 5 frames cannot be used, and the frame before stands for each"))
         << notes[0];
     EXPECT_FALSE(openVideoFrames({folder.path()}, job, true));
+}
+
+TEST(VideoFrames, WhatEightBitsLoseIsNotedOnceWhicheverFrameItIsOf) {
+    TemporaryFolder folder;
+    const auto notesOf = [&](const fs::path& input, int count) {
+        Job job;
+        {
+            const auto frames = openVideoFrames({input}, job);
+            EXPECT_TRUE(frames) << frames.error().text();
+            for (int k = 0; frames && k < 2 * count; ++k) EXPECT_TRUE((*frames)->frame(k % count));
+        }
+        return job.takeNotes();
+    };
+    for (const int k : {0, 2}) writePng(folder / fmt::format("deep{}.png", k), ramp(4, 4));
+    const std::vector<std::uint16_t> deep(4 * 4 * 3, 0x8012);
+    ASSERT_TRUE(writeFile(folder / "deep1.png", *encodePng(4, 4, 3, 16, deep.data(), true)));
+    EXPECT_EQ(notesOf(folder / "deep%d.png", 3),
+              std::vector<std::string>{"colour of 16 bits is rounded to 8"});
+    for (const float peak : {1.0f, 4.0f}) {
+        for (const int k : {0, 1, 2}) {
+            Frame frame;
+            frame.colour = Image<glm::vec4>(4, 4, glm::vec4(0.5f, 0.5f, 0.5f, 1.0f));
+            if (k == 1) frame.colour.at(2, 3).g = peak;
+            ASSERT_TRUE(writeFrame(frame, folder / fmt::format("light{}.exr", k), {}));
+        }
+        EXPECT_EQ(notesOf(folder / "light%d.exr", 3),
+                  std::vector<std::string>{
+                      peak > 1 ? "linear colour becomes 8-bit sRGB; values above 1 are clipped"
+                               : "linear colour becomes 8-bit sRGB"});
+    }
+    writeText(folder / "ten.y4m",
+              std::string_view("YUV4MPEG2 W1 H1 Cmono10\nFRAME\n\0\2FRAME\n\1\2", 40));
+    EXPECT_EQ(notesOf(folder / "ten.y4m", 2),
+              std::vector<std::string>{"colour of 10 bits is rounded to 8"});
 }
 
 TEST(VideoFrames, ASizeThatChangesAndABrokenPictureAreNamed) {
