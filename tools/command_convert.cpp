@@ -91,7 +91,7 @@ void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptio
 /// What was converted, for the summary and the report.
 struct Converted {
     std::size_t views = 0;
-    glm::ivec2 size{0};  ///< of the first view
+    PictureSizes sizes;  ///< of a film: of all frames
     std::int64_t points = 0;
     Timeline timeline;
 };
@@ -99,7 +99,7 @@ struct Converted {
 Converted summaryOf(const Bundle& bundle, bool countPoints) {
     Converted done;
     done.views = bundle.views.size();
-    if (done.views > 0) done.size = {bundle.views[0].camera.width, bundle.views[0].camera.height};
+    for (const ReferenceView& view : bundle.views) done.sizes.add(view.camera);
     if (countPoints) done.points = bundle.pointCount();
     return done;
 }
@@ -208,14 +208,11 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
     Converted done;
     const Timeline timeline = frames->timeline();
     ViewTally tally;
-    frames = watched(tallied(std::move(frames), tally),
-                     [&done](std::size_t frame, std::size_t index, const ReferenceView& view) {
-                         if (frame == 0 && index == 0)
-                             done.size = {view.camera.width, view.camera.height};
-                     });
+    frames = tallied(std::move(frames), tally);
     keepFreedMemory();  // of a view, for the next one
     STX_CHECK(saveSequence(*frames, target, saveOptions(o, program), program.job));
     done.views = tally.views();
+    done.sizes = tally.sizes();
     if (countPoints) done.points = tally.points();
     done.timeline = timeline;
     return done;
@@ -254,7 +251,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
         program.job.note("--video is of films and not used: nothing moves");
     std::string sizes;
     if (done->views > 0)
-        sizes = fmt::format(", {} {}x{}", counted(done->views, "view"), done->size.x, done->size.y);
+        sizes = fmt::format(", {} {}", counted(done->views, "view"), done->sizes.text());
     if (timeline.moves())
         sizes += fmt::format(", {} over {:.4g} s", counted(timeline.count(), "frame"),
                              timeline.duration());

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -323,7 +324,7 @@ void addObjectsOf(const Atlas& atlas, nlohmann::ordered_json& report) {
 }
 
 /// Several inputs into one atlas, each an object with a name.
-Result<int> packSheet(const PackOptions& o, Program& program) {
+Result<int> packSheet(const PackOptions& o, const Command& command, Program& program) {
     const Stopwatch watch;
     if (frameName(o.output, 0))
         return fail(ErrorCode::usage,
@@ -345,6 +346,8 @@ Result<int> packSheet(const PackOptions& o, Program& program) {
         STX_CHECK(program.job.limits.checkAllocation(held, 1, "the views of all objects"));
         objects.push_back(std::move(object));
     }
+    if (std::ranges::none_of(frames, [](const auto& f) { return f->timeline().moves(); }))
+        noteStill(command.given({"--time", "--period"}), "nothing moves", program.job);
     STX_TRY(auto joined, joinTables(std::move(objects), program.job));
     PackSettings settings = o.settings;
     settings.objects = &joined.objects;
@@ -369,7 +372,7 @@ Result<int> packSheet(const PackOptions& o, Program& program) {
 }
 
 /// An atlas holds one moment: that of --time, or one atlas for each frame.
-Result<int> packInput(const PackOptions& options, Program& program) {
+Result<int> packInput(const PackOptions& options, const Command& command, Program& program) {
     PackOptions o = options;
     STX_TRY(o.output, folderTarget(options.output, {".exr"}, "a folder or .exr"));
     if (o.quality && o.colour != "jpeg")
@@ -380,7 +383,7 @@ Result<int> packInput(const PackOptions& options, Program& program) {
     o.settings.bytesToWrite = bytesToWriteAtlas(o.output);
     if (!o.budget.empty()) STX_SET(o.pruning.budget, parsePixels(o.budget));
     STX_TRY(o.inputs, expandInputs(options.inputs, program.job.limits));
-    if (o.inputs.size() > 1 || !o.names.empty()) return packSheet(o, program);
+    if (o.inputs.size() > 1 || !o.names.empty()) return packSheet(o, command, program);
     o.input = o.inputs.front();
     preloadCodecs(o.input);
     STX_TRY(auto frames, openSequence(o.input, o.open.into(o.output), program.job));
@@ -391,6 +394,9 @@ Result<int> packInput(const PackOptions& options, Program& program) {
     const Timeline timeline = frames->timeline();
     const std::size_t count = timeline.count();
     const bool numbered = frameName(o.output, 0).has_value();
+    if (!timeline.moves())
+        noteStill(command.given({"--period"}), fmt::format("'{}' does not move", o.input),
+                  program.job);
     if (o.time || !numbered) {
         if (!o.time && timeline.moves())
             return fail(ErrorCode::usage,
@@ -477,7 +483,7 @@ void addPack(CommandLine& line, Program& program) {
         .range(0.0, 200.0);
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
-    c.runs([o](Program& p) { return packInput(*o, p); });
+    c.runs([o, c](Program& p) { return packInput(*o, c, p); });
 }
 
 }  // namespace stx::tools

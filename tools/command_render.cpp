@@ -15,6 +15,7 @@
 #include "tools/refining.hpp"
 #include "tools/render_scene.hpp"
 #include "tools/stage_options.hpp"
+#include "tools/view_tally.hpp"
 
 namespace stx::tools {
 namespace {
@@ -287,10 +288,11 @@ void sayDrawn(const RenderOptions& o, const DrawnScene& scene, const Drawn& draw
     program.sayNotes();
     const auto part = o.shard.rangeOf(pictures.size());
     const std::size_t all = part.end - part.first;
+    PictureSizes sizes;
+    for (const NovelCamera& picture : pictures) sizes.add(picture.camera);
     program.say(fmt::format(
-        "{} → {}, {} {}x{}, {}{}{}", std::filesystem::path(o.input).filename().string(), o.output,
-        counted(all, "picture"), pictures[0].camera.width, pictures[0].camera.height,
-        drawn.renderer ? drawn.renderer->backend() : "",
+        "{} → {}, {} {}, {}{}{}", std::filesystem::path(o.input).filename().string(), o.output,
+        counted(all, "picture"), sizes.text(), drawn.renderer ? drawn.renderer->backend() : "",
         drawn.count > 0
             ? fmt::format(", {:.1f} ms each", drawn.milliseconds / static_cast<double>(drawn.count))
             : "",

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <span>
 
 #include "lib/base/printable.hpp"
@@ -17,12 +18,13 @@ struct ReportOptions {
 
 /// The list of what is to be done again: missing and failed inputs, a line each.
 Result<std::string> listOfRest(const MergedReport& merged, const std::vector<std::string>& names) {
-    std::map<std::size_t, std::string> rest = merged.failed();
+    std::vector<std::size_t> rest = merged.failed();
     // There are as many names as the reports tell of inputs.
     for (const auto& gap : merged.missing())
-        for (std::size_t i = gap.first; i <= gap.last; ++i) rest[i] = names[i];
+        for (std::size_t i = gap.first; i <= gap.last; ++i) rest.push_back(i);
+    std::ranges::sort(rest);
     std::string text;
-    for (const auto& [index, name] : rest) text += name + "\n";
+    for (const std::size_t index : rest) text += names[index] + "\n";
     return text;
 }
 
@@ -44,11 +46,7 @@ Result<int> report(const ReportOptions& o, Program& program) {
     }
     if (merged.total() == 0)
         return fail(ErrorCode::invalidInput, "no report tells of an input or a picture");
-    if (!names.empty() && names.size() != merged.total())
-        return fail(ErrorCode::invalidInput,
-                    "--inputs names {} inputs, but the reports are of {}; the list must be the one "
-                    "that was converted",
-                    names.size(), merged.total());
+    if (!names.empty()) STX_CHECK(merged.checkInputs(names));
     if (!o.output.empty()) {
         const std::string text = merged.text();
         STX_CHECK(writeFile(o.output, std::as_bytes(std::span(text)), program.outputOptions()));

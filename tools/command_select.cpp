@@ -194,9 +194,12 @@ void addSelect(CommandLine& line, Program& program) {
     c.option("IN", o->input, "Bundle or film to choose from, or a mesh to look at from all sides")
         .required();
     c.option("-o,--output", o->output, "Bundle to write").required().replaces("OUT");
-    c.option("--count", o->settings.count, "Number of views to keep").range(1, 65536).takes("N");
+    c.option("--count", o->settings.count, "Number of views to keep; with --share at most so many")
+        .range(1, 65536)
+        .takes("N");
     c.option("--share", o->sharePercent,
-             "Keep as many as reach this much of the quality of all views, in percent (default 95)")
+             "Keep as many as reach this much of the quality of all views, in percent (default 95; "
+             "100 with --count)")
         .range(0.1, 100.0)
         .takes("PERCENT");
     c.option("--density", o->settings.targetDensity,

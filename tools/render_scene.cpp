@@ -28,6 +28,8 @@ void noteUnused(const Model& model, const RenderOptions& o, const Command& comma
                                          options.size() == 1 ? "is" : "are", why));
     };
     if (std::holds_alternative<Mesh>(model)) {
+        noteStill(command.given({"--time", "--times"}), fmt::format("'{}' is a mesh", o.input),
+                  program.job);
         note(command.given({"--mode", "--backend", "--device", "--pipeline", "--splat",
                             "--splat-coefficient", "--fill", "--match-colours", "--refine",
                             "--without", "--explain", "--quality"}),
@@ -177,8 +179,14 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
                              const Command& command, Program& program) {
     DrawnScene scene;
     const bool sways = o.camera.swayPercent > 0;
-    if (o.time.any()) {
+    // A mesh is no sequence; what stands still otherwise is one of a frame.
+    const auto kind = recognise(o.input);
+    const bool ofMesh = o.open.set.from.empty() && kind && *kind == FileKind::mesh;
+    if (o.time.any() && !ofMesh) {
         STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
+        if (!frames->timeline().moves())
+            noteStill(command.given({"--time", "--times"}),
+                      fmt::format("'{}' does not move", o.input), program.job);
         if (sways) STX_SET(scene.context.sway, swayPose(o, *frames, program.job));
         scene.moving = std::make_unique<MovingPictures>(
             std::move(frames), settings, o.backend, o.device, folderBeside(o.output), program.job);

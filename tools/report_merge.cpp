@@ -14,6 +14,12 @@ Result<std::size_t> wholeOf(const Json& json, const char* key) {
     return found->get<std::size_t>();
 }
 
+/// A name as it is read from a report, which is UTF-8 whatever the name's bytes are.
+std::string asReported(const std::string& name) {
+    const auto line = Json(name).dump(-1, ' ', false, Json::error_handler_t::replace);
+    return Json::parse(line).get<std::string>();
+}
+
 }  // namespace
 
 Result<void> MergedReport::expect(Kind kind, std::size_t total) {
@@ -150,12 +156,29 @@ std::vector<MergedReport::Gap> MergedReport::missing() const {
     return gaps;
 }
 
-std::map<std::size_t, std::string> MergedReport::failed() const {
-    std::map<std::size_t, std::string> out;
+std::vector<std::size_t> MergedReport::failed() const {
+    std::vector<std::size_t> out;
     for (const auto& [index, entry] : entries_)
-        if (entry.status == Status::error)
-            out[index] = Json::parse(entry.line, nullptr, false).value("input", "");
+        if (entry.status == Status::error) out.push_back(index);
     return out;
+}
+
+Result<void> MergedReport::checkInputs(const std::vector<std::string>& names) const {
+    if (names.size() != total_)
+        return fail(ErrorCode::invalidInput,
+                    "--inputs names {} inputs, but the reports are of {}; the list must be the one "
+                    "that was converted",
+                    names.size(), total_);
+    if (kind_ != Kind::inputs) return {};
+    for (const auto& [index, entry] : entries_) {
+        const auto told = Json::parse(entry.line, nullptr, false).value("input", "");
+        if (told != asReported(names[index]))
+            return fail(ErrorCode::invalidInput,
+                        "--inputs has '{}' as number {}, but the reports have '{}'; the list must "
+                        "be the one that was converted",
+                        names[index], index, told);
+    }
+    return {};
 }
 
 std::vector<std::string> MergedReport::outputs() const {

@@ -38,8 +38,11 @@ class MergedReport {
     /// All of these, ascending: one more than the entries at most, whatever total the reports tell.
     [[nodiscard]] std::vector<Gap> missing() const;
     [[nodiscard]] std::size_t missingCount() const { return total_ - entries_.size(); }
-    /// Inputs that failed, by index, with their names.
-    [[nodiscard]] std::map<std::size_t, std::string> failed() const;
+    /// The indices of inputs that failed, ascending.
+    [[nodiscard]] std::vector<std::size_t> failed() const;
+    /// Errors (invalidInput) when `names`, those of all inputs by index, are of another number, or
+    /// not the inputs of the reports (reports of pictures name none).
+    [[nodiscard]] Result<void> checkInputs(const std::vector<std::string>& names) const;
 
     /// The outputs that are reported as done or skipped, by index.
     [[nodiscard]] std::vector<std::string> outputs() const;

@@ -3,26 +3,42 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "lib/model/sequence.hpp"
 
 namespace stx::tools {
 
+/// The sizes of pictures, in pixels: "48x36", or "of 48x36 to 1600x1200".
+class PictureSizes {
+  public:
+    void add(const Camera& camera);
+    [[nodiscard]] std::string text() const;
+
+  private:
+    glm::ivec2 smallest_{0}, largest_{0};  ///< by their pixels, then by their width
+};
+
 /// What a command's report tells of the views that passed: those of the first frame.
 class ViewTally {
   public:
     /// From any thread; a view that passes again counts once.
     void add(std::size_t index, const ReferenceView& view);
+    /// From any thread.
+    void addSize(const Camera& camera);
     /// Before they pass anew.
     void clear() { points_.clear(); }
 
     [[nodiscard]] std::size_t views() const { return points_.size(); }
     [[nodiscard]] std::int64_t points() const;
+    /// Of all frames that passed by tallied().
+    [[nodiscard]] const PictureSizes& sizes() const { return sizes_; }
 
   private:
     std::mutex mutex_;
     std::vector<std::int64_t> points_;
+    PictureSizes sizes_;
 };
 
 /// The same frames, whose first is counted on its way. `tally` must outlive them.

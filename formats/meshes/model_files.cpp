@@ -42,7 +42,12 @@ Result<std::filesystem::path> ModelFiles::find(std::string_view name,
     return path;
 }
 
-std::string_view whyNotThere(const Error& error) {
+std::string_view ModelFiles::whyNotThere(std::string_view name, const Error& error) const {
+    std::error_code ec;
+    const auto status = std::filesystem::status(folder_ / name, ec);
+    if (std::filesystem::is_directory(status)) return "is a folder, not a file";
+    if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+        return "is a device or a pipe, not a file";
     if (error.code == ErrorCode::io) return "cannot be read";
     return "is outside of the model's folder (--allow-outside reads what is there) and not in it";
 }
@@ -73,7 +78,7 @@ Result<int> ModelFiles::textureFromFile(std::string_view name, SamplerState samp
     if (const auto index = known(name, sampler, textures)) return *index;
     const auto without = [&](const Error& error) {
         job_.note(fmt::format("texture '{}' {}; the plain colour is used instead", name,
-                              whyNotThere(error)));
+                              whyNotThere(name, error)));
         first_.emplace(std::string(name), -1);
         return -1;
     };

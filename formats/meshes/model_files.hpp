@@ -42,6 +42,9 @@ class ModelFiles {
     [[nodiscard]] Result<std::filesystem::path> find(std::string_view name,
                                                      const std::string& alsoIn = {}) const;
 
+    /// What a note says of a file that find() did not find, with its error.
+    [[nodiscard]] std::string_view whyNotThere(std::string_view name, const Error& error) const;
+
     /// Base colour textures of materials need not be opened: another one is put on all of them. A
     /// reader may give materials a texture of one pixel instead, which keeps how theirs is sampled;
     /// then these get the other one, and no others do.
@@ -81,9 +84,6 @@ class ModelFiles {
 
 /// "%20" and the like of a URI made bytes again.
 [[nodiscard]] std::string percentDecoded(std::string_view uri);
-
-/// What a note says of a file that find() did not find, with its error.
-[[nodiscard]] std::string_view whyNotThere(const Error& error);
 
 /// True for `scheme:...` with a scheme of two letters or more.
 [[nodiscard]] bool hasUriScheme(std::string_view name);

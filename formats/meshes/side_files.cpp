@@ -29,7 +29,8 @@ Bytes bytesOf(std::string_view text) {
 std::optional<std::filesystem::path> SideFiles::find(const std::string& file) {
     auto path = files_.find(file);
     if (path) return std::move(*path);
-    if (missing_.empty()) missing_ = fmt::format("'{}' {}", file, whyNotThere(path.error()));
+    if (missing_.empty())
+        missing_ = fmt::format("'{}' {}", file, files_.whyNotThere(file, path.error()));
     return std::nullopt;
 }
 

@@ -393,12 +393,6 @@ Result<void> checkSameViews(const Bundle& first, const Bundle& frame) {
         if (is.name != was.name)
             return fail(ErrorCode::invalidInput, "view {} is '{}' at {:g} s, but '{}' at the start",
                         i, is.name, time, was.name);
-        if (is.camera.width != was.camera.width || is.camera.height != was.camera.height)
-            return fail(ErrorCode::invalidInput,
-                        "view '{}' is {}x{} at {:g} s, but {}x{} at the start; the size of a "
-                        "moving picture cannot change",
-                        is.name, is.camera.width, is.camera.height, time, was.camera.width,
-                        was.camera.height);
     }
     return {};
 }

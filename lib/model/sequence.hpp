@@ -125,7 +125,7 @@ class Sequence {
 [[nodiscard]] std::unique_ptr<Sequence> acrossDamage(std::unique_ptr<Sequence> frames);
 
 /// Errors (invalidInput), which name the view and the time, when a frame does not have the views of
-/// the first: their number, names and sizes.
+/// the first: their number and names. Sizes may change.
 [[nodiscard]] Result<void> checkSameViews(const Bundle& first, const Bundle& frame);
 
 }  // namespace stx

@@ -45,6 +45,21 @@ struct ViewTrack {
     bool coverageLost = false;         ///< by colour that is H.264
 };
 
+/// Errors: those of checkSameViews(), and (unsupported) a view whose size changes: a stream has
+/// one.
+Result<void> checkFrame(const Bundle& first, const Bundle& frame) {
+    STX_CHECK(checkSameViews(first, frame));
+    for (std::size_t i = 0; i < first.views.size(); ++i) {
+        const Camera &was = first.views[i].camera, &is = frame.views[i].camera;
+        if (is.width != was.width || is.height != was.height)
+            return fail(ErrorCode::unsupported,
+                        "view '{}' is {}x{}, but {}x{} at the start; in MPEG-4 a view keeps one "
+                        "size for a whole film; write .exr",
+                        first.views[i].name, is.width, is.height, was.width, was.height);
+    }
+    return {};
+}
+
 class SequenceWriter {
   public:
     SequenceWriter(Sequence& frames, const SceneWriteOptions& options, PictureSpool& spool,
@@ -124,7 +139,7 @@ class SequenceWriter {
                 ranges.resize(table->count());
                 first_ = headersOf(std::as_const(*table).about());
             }
-            auto looked = checkSameViews(first_, std::as_const(*table).about());
+            auto looked = checkFrame(first_, std::as_const(*table).about());
             if (looked) looked = lookAt(*table, ranges, i == 0, quiet);
             if (!looked) return tl::unexpected(looked.error().at(placeOf(i)));
         }
@@ -326,7 +341,7 @@ class SequenceWriter {
     }
 
     Result<void> add(const ViewTable& table, std::size_t index, Job& job) {
-        STX_CHECK(checkSameViews(first_, table.about()));
+        STX_CHECK(checkFrame(first_, table.about()));
         const std::uint64_t now = ticks(frames_.timeline().times[index]);
         return coded(
             table, job,
