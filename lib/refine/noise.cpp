@@ -44,10 +44,9 @@ constexpr float kLeastNoise = 0.001f;
 /// And than this share of a pixel's width: exact tori whose tubes are six pixels wide have up to
 /// 0.1, statue with 0.5 % noise has 3.5. A torus of 34 pixels with 0.5 % has 0.2: with 0.25 here
 /// votes tear its surface, 18.2 dB instead of 25.3. Bars of five pixels with 0.2 % are measured to
-/// have 0.09 to 0.16: with 0.15 here four of six views stay as they are, 20.8 dB instead of 33.5;
-/// of 300
-/// noisy cases of 44x40 the mean rises by 0.15 dB (-4.6 to 6.9), and no exact view of 650 cases is
-/// taken for noisy.
+/// have 0.09 to 0.16: with 0.15 here four of six views stay as they are, 20.8 dB instead of 33.5.
+/// Of 300 noisy cases of 44x40 the mean rises by 0.15 dB (-4.6 to 6.9), and no exact view of 650
+/// cases is taken for noisy.
 constexpr float kLeastOfPixel = 0.11f;
 /// Radii of the windows that are tried, pixels.
 constexpr int kRadii[] = {1, 2, 4, 6, 8};
