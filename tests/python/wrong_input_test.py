@@ -187,8 +187,12 @@ class WrongInput(Case):
         self.assertEqual(film[-1].time, film.times[1])
         self.fails("usage", "no bundles", stx.Film, [])
         self.fails("usage", "rate is 0", stx.Film, [self.bundle], rate=0)
-        other = stx.Bundle([plate(stx.Camera((7, 4), 5))])
-        self.fails("invalidInput", "", stx.Film, [self.bundle, other])
+        one = self.bundle.views[0]
+        second = stx.View(one.colour, one.depth, one.camera, name="second")
+        self.fails("invalidInput", "", stx.Film, [self.bundle, stx.Bundle([one, second])])
+        # Sizes may change, but not in MPEG-4.
+        resized = stx.Film([self.bundle, stx.Bundle([plate(stx.Camera((7, 4), 5))])])
+        self.fails("unsupported", "keeps one size for a whole film; write .exr", resized.save, "resized.mp4")
         self.fails("usage", "2 cameras and 3 times", stx.render, film, [self.camera] * 2, times=[0, 1, 2])
         for wrong in (np.nan, np.inf, -np.inf):
             self.fails("usage", f"time is {wrong}; a finite number of seconds", film.frame_at, wrong)
