@@ -318,8 +318,7 @@ void addCompare(CommandLine& line, Program& program) {
     c.option("B", o->b, "The same").required();
     c.option("--mask", o->mask,
              "Image; only pixels count whose luma times alpha is at least half of white in it, or, "
-             "where "
-             "it has one value beside 0, that have this one")
+             "where it has one value beside 0, that have this one")
         .reads("IMAGE");
     c.option("--error-picture", o->errorPicture,
              "Write where they differ as a PNG, of folders into one")

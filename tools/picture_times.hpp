@@ -27,9 +27,8 @@ struct TimeOptions {
 /// Notes options of films that are given for what does not move: `why`, as in "nothing moves".
 void noteStill(const std::vector<std::string>& options, const std::string& why, Job& job);
 /// The frame of --time, the first where it is not given; a time outside the film is noted, and one
-/// of what does not move. Errors
-/// (usage): as checkTime(); none of a film for what is of one moment only: `whatIs`, as in "points
-/// are", else null.
+/// of what does not move. Errors (usage): as checkTime(); none of a film for what is of one moment
+/// only: `whatIs`, as in "points are", else null.
 [[nodiscard]] Result<std::size_t> momentOf(const std::optional<double>& time,
                                            const Timeline& timeline, const char* whatIs,
                                            const std::string& input, Job& job);

@@ -179,7 +179,7 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
                              const Command& command, Program& program) {
     DrawnScene scene;
     const bool sways = o.camera.swayPercent > 0;
-    // A mesh is no sequence; what stands still otherwise is one of a frame.
+    // A mesh is not a sequence; whatever else does not move is one of a single frame.
     const auto kind = recognise(o.input);
     const bool ofMesh = o.open.set.from.empty() && kind && *kind == FileKind::mesh;
     if (o.time.any() && !ofMesh) {

@@ -171,12 +171,12 @@ Result<void> MergedReport::checkInputs(const std::vector<std::string>& names) co
                     names.size(), total_);
     if (kind_ != Kind::inputs) return {};
     for (const auto& [index, entry] : entries_) {
-        const auto told = Json::parse(entry.line, nullptr, false).value("input", "");
-        if (told != asReported(names[index]))
+        const auto reported = Json::parse(entry.line, nullptr, false).value("input", "");
+        if (reported != asReported(names[index]))
             return fail(ErrorCode::invalidInput,
                         "--inputs has '{}' as number {}, but the reports have '{}'; the list must "
                         "be the one that was converted",
-                        names[index], index, told);
+                        names[index], index, reported);
     }
     return {};
 }

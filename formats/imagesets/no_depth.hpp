@@ -4,7 +4,7 @@
 
 namespace stx::imagesets {
 
-/// Where there is no point there is no object, unless its distance may be unknown. Partly covered
+/// Makes pixels without a point transparent, unless their distance may be unknown. Partly covered
 /// pixels of the set's own alpha stay: they are the silhouette of points beside them.
 void coverOnlyPoints(Texture& texture, Image<float>& depth, bool ownAlpha, bool mayBeUnknown);
 

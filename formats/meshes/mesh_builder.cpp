@@ -326,8 +326,8 @@ void MeshBuilder::roundPositions() {
     positions_ = {};
 }
 
-/// A material that no triangle has is no colour of the model, and its maps need no coordinates: all
-/// primitives that have it may be drawn with a copy without maps, for lack of them.
+/// A material that no triangle has is not a colour of the model, and its maps need no coordinates:
+/// all primitives that have it may be drawn with a copy without maps, for lack of them.
 void MeshBuilder::dropUnusedTextures() {
     std::vector<bool> used(mesh_.materials.size());
     for (const auto m : mesh_.triangleMaterial)
