@@ -248,7 +248,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     if (!done) STX_SET(done, convertStill(input, target, o, countPoints, program));
     const Timeline& timeline = done->timeline;
     if (!o.video.empty() && !timeline.moves())
-        program.job.note("--video is of films and not used: nothing moves");
+        program.job.noteUnused({"--video"}, "of films", "nothing moves");
     std::string sizes;
     if (done->views > 0)
         sizes = fmt::format(", {} {}", counted(done->views, "view"), done->sizes.text());

@@ -347,7 +347,7 @@ Result<int> packSheet(const PackOptions& o, const Command& command, Program& pro
         objects.push_back(std::move(object));
     }
     if (std::ranges::none_of(frames, [](const auto& f) { return f->timeline().moves(); }))
-        noteStill(command.given({"--time", "--period"}), "nothing moves", program.job);
+        program.job.noteUnused(command.given({"--time", "--period"}), "of films", "nothing moves");
     STX_TRY(auto joined, joinTables(std::move(objects), program.job));
     PackSettings settings = o.settings;
     settings.objects = &joined.objects;
@@ -395,8 +395,8 @@ Result<int> packInput(const PackOptions& options, const Command& command, Progra
     const std::size_t count = timeline.count();
     const bool numbered = frameName(o.output, 0).has_value();
     if (!timeline.moves())
-        noteStill(command.given({"--period"}), fmt::format("'{}' does not move", o.input),
-                  program.job);
+        program.job.noteUnused(command.given({"--period"}), "of films",
+                               fmt::format("'{}' does not move", o.input));
     if (o.time || !numbered) {
         if (!o.time && timeline.moves())
             return fail(ErrorCode::usage,

@@ -75,12 +75,6 @@ Result<void> checkTime(const std::optional<double>& time) {
     return fail(ErrorCode::usage, "--time is {}; a finite number of seconds is expected", *time);
 }
 
-void noteStill(const std::vector<std::string>& options, const std::string& why, Job& job) {
-    if (options.empty()) return;
-    job.note(fmt::format("{} {} of films and not used: {}", fmt::join(options, ", "),
-                         options.size() == 1 ? "is" : "are", why));
-}
-
 Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& timeline,
                              const char* whatIs, const std::string& input, Job& job) {
     STX_CHECK(checkTime(time));
@@ -89,7 +83,8 @@ Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& 
                     "'{}' has {} frames, and {} of one moment; give --time T, in seconds", input,
                     timeline.count(), whatIs);
     if (!time) return std::size_t{0};
-    if (!timeline.moves()) noteStill({"--time"}, fmt::format("'{}' does not move", input), job);
+    if (!timeline.moves())
+        job.noteUnused({"--time"}, "of films", fmt::format("'{}' does not move", input));
     noteOutside({*time}, timeline, job);
     return timeline.frameAt(*time);
 }

@@ -24,8 +24,6 @@ struct TimeOptions {
 
 /// Errors (usage): a time that is none (NaN, infinity).
 [[nodiscard]] Result<void> checkTime(const std::optional<double>& time);
-/// Notes options of films that are given for what does not move: `why`, as in "nothing moves".
-void noteStill(const std::vector<std::string>& options, const std::string& why, Job& job);
 /// The frame of --time, the first where it is not given; a time outside the film is noted, and one
 /// of what does not move. Errors (usage): as checkTime(); none of a film for what is of one moment
 /// only: `whatIs`, as in "points are", else null.

@@ -23,13 +23,11 @@ namespace {
 void noteUnused(const Model& model, const RenderOptions& o, const Command& command,
                 Program& program) {
     const auto note = [&](const std::vector<std::string>& options, const char* why) {
-        if (!options.empty())
-            program.job.note(fmt::format("{} {} not used: {}", fmt::join(options, ", "),
-                                         options.size() == 1 ? "is" : "are", why));
+        program.job.noteUnused(options, "", why);
     };
     if (std::holds_alternative<Mesh>(model)) {
-        noteStill(command.given({"--time", "--times"}), fmt::format("'{}' is a mesh", o.input),
-                  program.job);
+        program.job.noteUnused(command.given({"--time", "--times"}), "of films",
+                               fmt::format("'{}' is a mesh", o.input));
         note(command.given({"--mode", "--backend", "--device", "--pipeline", "--splat",
                             "--splat-coefficient", "--fill", "--match-colours", "--refine",
                             "--without", "--explain", "--quality"}),
@@ -185,8 +183,8 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
     if (o.time.any() && !ofMesh) {
         STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
         if (!frames->timeline().moves())
-            noteStill(command.given({"--time", "--times"}),
-                      fmt::format("'{}' does not move", o.input), program.job);
+            program.job.noteUnused(command.given({"--time", "--times"}), "of films",
+                                   fmt::format("'{}' does not move", o.input));
         if (sways) STX_SET(scene.context.sway, swayPose(o, *frames, program.job));
         scene.moving = std::make_unique<MovingPictures>(
             std::move(frames), settings, o.backend, o.device, folderBeside(o.output), program.job);

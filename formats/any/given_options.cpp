@@ -37,24 +37,21 @@ void noteUnusedOptions(const std::filesystem::path& input, Reads as, const Given
     const bool set = isSet(input, kind, options, job.limits);
     const auto note = [&](const std::vector<std::string>& names, const char* ofWhat,
                           const char* isWhat) {
-        if (names.empty()) return;
-        job.note(fmt::format("{} {} of {} and not used: '{}' is {}", fmt::join(names, ", "),
-                             names.size() == 1 ? "is" : "are", ofWhat, input.filename().string(),
-                             isWhat));
+        job.noteUnused(names, ofWhat, fmt::format("'{}' is {}", input.filename().string(), isWhat));
     };
     if (as != Reads::mesh) {
         auto names = given.ofMeshes;
         // Of an image set it is the pattern of names.
         if (set) take(names, "texture");
         if (isPhoto(kind, options)) take(names, "fov");
-        note(names, "meshes", kind ? nameOf(*kind) : "none");
+        note(names, "of meshes", kind ? nameOf(*kind) : "none");
     } else {
-        note(given.ofViews, "inputs with views", nameOf(FileKind::mesh));
+        note(given.ofViews, "of inputs with views", nameOf(FileKind::mesh));
     }
     if (set) return;
     auto names = given.ofSets;
     if (as == Reads::film) take(names, "strict");
-    note(names, "image sets", nameOf(*kind));
+    note(names, "of image sets", nameOf(*kind));
 }
 
 Result<void> checkFrameOf(const std::filesystem::path& input, const OpenOptions& options,

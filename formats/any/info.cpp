@@ -391,19 +391,16 @@ Result<Json> describeNumbered(const fs::path& path, const InfoOptions& options, 
     STX_TRY(const auto files, numberedFiles(path.string()));
     OpenOptions open;
     open.object = options.object;
-    STX_TRY(const auto frames, openSequence(path, open, job));
+    STX_TRY(const auto film, openNumbered(path, open, job));
     STX_TRY(Json out, describe(files.front().path, options, job));
     out["file"] = path.string();
     std::uint64_t bytes = 0;
     for (const NumberedFile& file : files) bytes += bytesAt(file.path);
     out["bytes"] = bytes;
-    addTime(out, frames->timeline());
+    addTime(out, film.frames->timeline());
     if (!out.contains("bounds") || files.size() < 2) return out;
-    Job quiet;  // openSequence() has said so
-    quiet.workFor(job);
-    STX_TRY(const auto bounds, boundsOfNumbered(path, quiet));
-    if (bounds && options.object.empty())
-        out["bounds"] = boundsJson(bounds->bounds, bounds->origin);
+    if (film.bounds)
+        out["bounds"] = boundsJson(film.bounds->bounds, film.bounds->origin);
     else
         job.note("bounds are those of the first frame: headers do not tell those of all");
     return out;

@@ -120,14 +120,14 @@ std::optional<FilmBounds> boundsOf(const std::vector<Shown>& shown) {
 
 /// The files that tell when they are shown. The others are left out with a note, so that those
 /// before are shown on; they are errors when `strict`, or when none is left.
-struct NumberedFilm {
+struct UsableFiles {
     std::vector<NumberedFile> files;
     std::vector<Shown> shown;
     bool atlases = false;
 };
-Result<NumberedFilm> usableFiles(std::vector<NumberedFile> files, const fs::path& pattern,
-                                 bool strict, Job& job) {
-    NumberedFilm film;
+Result<UsableFiles> usableFiles(std::vector<NumberedFile> files, const fs::path& pattern,
+                                bool strict, Job& job) {
+    UsableFiles film;
     std::optional<Error> first;
     const auto all = files.size();
     if (const auto gap = firstMissing(files)) {
@@ -167,12 +167,9 @@ Result<NumberedFilm> usableFiles(std::vector<NumberedFile> files, const fs::path
     return film;
 }
 
-Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> all,
-                                               const fs::path& pattern, const OpenOptions& options,
-                                               Job& job) {
-    STX_TRY(auto film, usableFiles(std::move(all), pattern, options.set.strict, job));
-    auto& files = film.files;
-    if (!film.atlases) STX_CHECK(checkObject(pattern, FileKind::exr, options));
+/// When the frames of files are shown: as they tell, or at the usual rate.
+Result<Timeline> timelineOf(const UsableFiles& film, const fs::path& pattern, Job& job) {
+    const auto& files = film.files;
     Timeline line;
     line.times.clear();
     std::optional<double> last;
@@ -201,10 +198,7 @@ Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> all,
         line.end += line.times.back() - line.times[line.count() - 2];
     line.findTick();
     STX_CHECK(within(fmt::format("'{}'", pattern.string()), line.check()));
-    // Those of an atlas are of all its objects.
-    const auto bounds = options.object.empty() ? boundsOf(film.shown) : std::nullopt;
-    return std::make_unique<NumberedSequence>(std::move(files), film.atlases, std::move(line),
-                                              options.object, bounds);
+    return line;
 }
 
 /// Frames as their files have them.
@@ -213,8 +207,8 @@ Result<std::unique_ptr<Sequence>> openFrames(const fs::path& path, const OpenOpt
     STX_TRY(const auto kind, recognise(path));
     STX_CHECK(checkObject(path, kind, options));
     if (kind == FileKind::numbered) {
-        STX_TRY(auto files, numberedFiles(path.string()));
-        return openNumbered(std::move(files), path, options, job);
+        STX_TRY(auto film, openNumbered(path, options, job));
+        return std::move(film.frames);
     }
     if (kind == FileKind::imageSet || !options.set.from.empty())
         return openImageSet(path, options.set, job);
@@ -240,10 +234,16 @@ Result<std::unique_ptr<Sequence>> openSequence(const fs::path& path, const OpenO
     return acrossDamage(std::move(frames));
 }
 
-Result<std::optional<FilmBounds>> boundsOfNumbered(const fs::path& pattern, Job& job) {
-    STX_TRY(auto files, numberedFiles(pattern.string()));
-    STX_TRY(const auto film, usableFiles(std::move(files), pattern, false, job));
-    return boundsOf(film.shown);
+Result<NumberedFilm> openNumbered(const fs::path& pattern, const OpenOptions& options, Job& job) {
+    STX_TRY(auto all, numberedFiles(pattern.string()));
+    STX_TRY(auto film, usableFiles(std::move(all), pattern, options.set.strict, job));
+    if (!film.atlases) STX_CHECK(checkObject(pattern, FileKind::exr, options));
+    STX_TRY(auto line, timelineOf(film, pattern, job));
+    // Those of an atlas are of all its objects.
+    const auto bounds = options.object.empty() ? boundsOf(film.shown) : std::nullopt;
+    auto frames = std::make_unique<NumberedSequence>(std::move(film.files), film.atlases,
+                                                     std::move(line), options.object, bounds);
+    return NumberedFilm{std::move(frames), bounds};
 }
 
 bool holdsSequences(const fs::path& target) {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "formats/any/options.hpp"
 #include "lib/base/job.hpp"
@@ -22,10 +23,14 @@ struct FilmBounds {
     Bounds bounds;
     glm::dvec3 origin{0.0};
 };
-/// Of a film of numbered files, by their headers; none where these do not tell all. Errors: none of
-/// the files can be used.
-[[nodiscard]] Result<std::optional<FilmBounds>> boundsOfNumbered(
-    const std::filesystem::path& pattern, Job& job);
+/// A film of numbered files, frames as these have them.
+struct NumberedFilm {
+    std::unique_ptr<Sequence> frames;
+    std::optional<FilmBounds> bounds;  ///< by the files' headers; none where these do not tell all
+};
+/// Opens one. Errors as openSequence().
+[[nodiscard]] Result<NumberedFilm> openNumbered(const std::filesystem::path& pattern,
+                                                const OpenOptions& options, Job& job);
 
 /// Whether a target can hold more than one frame: MPEG-4, or a numbered name of .exr.
 [[nodiscard]] bool holdsSequences(const std::filesystem::path& target);

@@ -232,7 +232,6 @@ Result<SetDescription> describeFirst(const std::filesystem::path& path,
 
 /// Options for the moments of what moves: cameras of each by itself would tremble.
 ImageSetOptions ofMoment(ImageSetOptions options) {
-    options.roundingSaid = std::make_shared<std::atomic<bool>>(false);
     if (options.refine.of(RefineStep::poses) == RefineSwitch::automatic)
         options.refine.set(RefineStep::poses, false);
     return options;

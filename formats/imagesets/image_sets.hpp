@@ -99,9 +99,6 @@ struct ImageSetOptions {
     /// Pictures of 16-bit integers become linear floats, of which they come back to the bit (then
     /// all pictures of the set do); else they are rounded to 8 bits, with a note.
     bool deepColour = false;
-    /// Of a film: whether that note was said. It is said once, of the first such picture that is
-    /// read, even to those who drop the notes of later frames. Null: not of a film.
-    std::shared_ptr<std::atomic<bool>> roundingSaid;
 };
 
 /// A kind of image set, for `--from` and its help.

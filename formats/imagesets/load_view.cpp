@@ -91,8 +91,7 @@ Result<void> applyMask(const SetView& set, const std::filesystem::path& file, St
 Result<StoredView> readStored(const SetView& set, const ImageSetOptions& options, Job& job) {
     if (set.load) return set.load(set, job);
     StoredView stored;
-    STX_TRY(auto colour, readColour(set.texture, options.yuv, options.deepColour, job,
-                                    options.roundingSaid.get()));
+    STX_TRY(auto colour, readColour(set.texture, options.yuv, options.deepColour, job));
     stored.texture = std::move(colour.texture);
     stored.alpha = colour.alpha;
     STX_TRY(auto depth, readDepth(set.depth, job));

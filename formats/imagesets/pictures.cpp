@@ -164,29 +164,26 @@ Result<RgbaFloatImage> colourOfFloats(const DecodedImage& image, std::string_vie
     return pixels;
 }
 
-void noteRounding(int bits, std::string_view remedy, std::atomic<bool>* said, Job& job) {
-    const std::string text = fmt::format("colour of {} bits is rounded to 8{}", bits, remedy);
-    if (!said)
-        job.note(text);
-    else if (!said->exchange(true))
-        job.noteAbove(text);
+/// Said even where the notes of a film's later frames are dropped.
+void noteRounding(int bits, std::string_view remedy, Job& job) {
+    job.noteOnce(fmt::format("colour of {} bits is rounded to 8{}", bits, remedy));
 }
 
 }  // namespace
 
 Result<StoredColour> readColour(const PictureSource& source, const YuvColour& colour, bool deep,
-                                Job& job, std::atomic<bool>* said) {
+                                Job& job) {
     StoredColour out;
     if (source.yuv) {
         STX_TRY(auto image,
                 readYuvColour(source.path, *source.yuv, source.frame, colour, job.limits));
-        if (source.yuv->bits > 8) noteRounding(source.yuv->bits, "", said, job);
+        if (source.yuv->bits > 8) noteRounding(source.yuv->bits, "", job);
         out.texture = std::move(image);
         return out;
     }
     if (source.film) {
         STX_TRY(const auto picture, source.film->picture(source.frame));
-        if (picture.bits() > 8) noteRounding(picture.bits(), "", said, job);
+        if (picture.bits() > 8) noteRounding(picture.bits(), "", job);
         if (const std::string note = picture.notConverted(); !note.empty())
             job.note(inQuotes(source.name) + ": " + note);
         STX_TRY(auto image, within(inQuotes(source.name), picture.colour(job.limits)));
@@ -212,8 +209,7 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         if (image.bits() == 16 && deep) {
             out.texture = linearFromCoded(photos::srgbFloatFrom(image, bytes, colours));
         } else {
-            if (image.bits() == 16)
-                noteRounding(16, "; stx convert -o NAME.exr keeps it", said, job);
+            if (image.bits() == 16) noteRounding(16, "; stx convert -o NAME.exr keeps it", job);
             out.texture = photos::srgb8From(image, bytes, colours);
         }
         if (!colours.empty()) job.note(colours);

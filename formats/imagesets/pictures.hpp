@@ -1,7 +1,5 @@
 #pragma once
 
-#include <atomic>
-
 #include "formats/files/files.hpp"
 #include "formats/imagesets/set_view.hpp"
 
@@ -12,10 +10,9 @@ struct StoredColour {
     Texture texture;
     bool alpha = false;
 };
-/// `deep`: see ImageSetOptions::deepColour, and `said` ImageSetOptions::roundingSaid.
+/// `deep`: see ImageSetOptions::deepColour.
 [[nodiscard]] Result<StoredColour> readColour(const PictureSource& source, const YuvColour& colour,
-                                              bool deep, Job& job,
-                                              std::atomic<bool>* said = nullptr);
+                                              bool deep, Job& job);
 
 /// The values of a depth or disparity image as they are stored, and their bits (32 = floats).
 struct StoredDepth {

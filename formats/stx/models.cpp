@@ -75,7 +75,7 @@ namespace {
 /// Settings of meshes that were given for views, which have cameras and sizes already.
 void noteUnused(const ConvertSettings& given, Job& job) {
     const ConvertSettings usual;
-    std::vector<const char*> unused;
+    std::vector<std::string> unused;
     const auto look = [&](auto ConvertSettings::*setting, const char* name) {
         if (given.*setting != usual.*setting) unused.push_back(name);
     };
@@ -91,9 +91,7 @@ void noteUnused(const ConvertSettings& given, Job& job) {
     look(&ConvertSettings::materials, "materials");
     look(&ConvertSettings::up, "up");
     if (!given.cameras.empty()) unused.push_back("cameras");
-    if (!unused.empty())
-        job.note(fmt::format("{} {} of meshes and not used: the model has views already",
-                             fmt::join(unused, ", "), unused.size() == 1 ? "is" : "are"));
+    job.noteUnused(unused, "of meshes", "the model has views already");
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "lib/base/job.hpp"
 
+#include <algorithm>
+
 namespace stx {
 
 Result<void> Limits::checkAllocation(std::uint64_t count, std::uint64_t bytesEach,
@@ -39,6 +41,20 @@ void Job::noteAbove(std::string text) {
         whole_->noteAbove(std::move(text));
     else
         note(std::move(text));
+}
+
+void Job::noteOnce(std::string text) {
+    if (whole_) return whole_->noteOnce(std::move(text));
+    const std::lock_guard lock(mutex_);
+    const auto known = std::ranges::find(notes_, text, &Note::text);
+    if (known == notes_.end()) notes_.push_back({std::move(text)});
+}
+
+void Job::noteUnused(const std::vector<std::string>& names, std::string_view of,
+                     std::string_view why) {
+    if (names.empty()) return;
+    note(fmt::format("{} {} {}{}not used: {}", fmt::join(names, ", "),
+                     names.size() == 1 ? "is" : "are", of, of.empty() ? "" : " and ", why));
 }
 
 std::vector<std::string> Job::takeNotes() {

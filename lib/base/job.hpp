@@ -45,6 +45,11 @@ class Job {
     void passNotesOn();
     /// A note that must not be dropped: it goes to the job that this one works for, at once.
     void noteAbove(std::string text);
+    /// The same, of what many parts of the work meet: it is said once, and not how often.
+    void noteOnce(std::string text);
+    /// "NAMES are OF and not used: WHY" where there are names; `of` as in "of films", or empty.
+    void noteUnused(const std::vector<std::string>& names, std::string_view of,
+                    std::string_view why);
     /// The notes so far, sorted by first mention; duplicates counted as `text (3 times)`.
     [[nodiscard]] std::vector<std::string> takeNotes();
 
