@@ -12,6 +12,7 @@
 #include "lib/geometry/near_views.hpp"
 #include "lib/geometry/pixel_space.hpp"
 #include "lib/refine/local_plane.hpp"
+#include "lib/refine/plane_samples.hpp"
 #include "lib/refine/reproject.hpp"
 
 namespace stx {
@@ -25,14 +26,8 @@ constexpr double kFarTimes = 1000.0;
 constexpr std::size_t kComparedViews = 4;
 /// Views that may show what pruning took from a view: as many as prune() asks.
 constexpr std::size_t kPrunedByViews = 24;
-/// Colours are compared in a window of so many samples a side, so many pixels apart.
-constexpr int kSamplesASide = 3, kSampleStep = 3;
 /// Samples of another colour than the middle's count less: a difference by which they count 1 / e.
 constexpr float kAlikeColour = 0.08f;
-/// Colours that differ by more, mean of the channels, differ altogether.
-constexpr float kMostDifferent = 0.12f;
-/// What a measured point in another view may be off by, a share of q, and be the same surface.
-constexpr float kSamePlaceThere = 0.02f;
 /// Planes that differ by this share of q are one.
 constexpr float kSamePlane = 0.0005f;
 /// The difference that a pixel gets which no other view shows.
@@ -49,16 +44,6 @@ constexpr float kFirstBand = 0.03f, kPlaneBand = 0.01f;
 /// Pixels with points around those without that are drawn, too, so that surfaces meet.
 constexpr int kRing = 2;
 
-struct Plane {
-    float q = 0, gx = 0, gy = 0;  ///< at the pixel it is kept for
-};
-
-struct Side {
-    const Rgba8Image* colours;
-    const Image<float>* q;  ///< 0 or less: no point
-    Warp warp;              ///< from the pixels of the view that is looked at
-};
-
 Rgba8Image codedColours(const RgbaFloatImage& linear) {
     Rgba8Image out(linear.width(), linear.height());
     parallelFor(0, out.count(), 4096, [&](std::size_t i) {
@@ -70,18 +55,6 @@ Rgba8Image codedColours(const RgbaFloatImage& linear) {
     return out;
 }
 
-glm::vec3 colourBetween(const Rgba8Image& image, float u, float v) {
-    const float x = std::clamp(u - 0.5f, 0.0f, static_cast<float>(image.width() - 1));
-    const float y = std::clamp(v - 0.5f, 0.0f, static_cast<float>(image.height() - 1));
-    const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
-    const int x1 = std::min(x0 + 1, image.width() - 1), y1 = std::min(y0 + 1, image.height() - 1);
-    const float tx = x - static_cast<float>(x0), ty = y - static_cast<float>(y0);
-    const auto at = [&](int i, int j) { return glm::vec3(glm::u8vec3(image.at(i, j))); };
-    return ((at(x0, y0) * (1 - tx) + at(x1, y0) * tx) * (1 - ty) +
-            (at(x0, y1) * (1 - tx) + at(x1, y1) * tx) * ty) *
-           (1.0f / 255.0f);
-}
-
 float apart(const glm::vec3& a, const glm::vec3& b) {
     const glm::vec3 d = glm::abs(a - b);
     return (d.x + d.y + d.z) * (1.0f / 3.0f);
@@ -90,7 +63,8 @@ float apart(const glm::vec3& a, const glm::vec3& b) {
 /// Spreads planes over the pixels of one view.
 class Spreading {
   public:
-    Spreading(const Rgba8Image& colours, const Image<float>& q, std::vector<Side> others, float far)
+    Spreading(const Rgba8Image& colours, const Image<float>& q, std::vector<OtherView> others,
+              float far)
         : colours_(colours), q_(q), others_(std::move(others)), far_(far), width_(q.width()) {}
 
     /// q of all pixels that are wanted: those where `wanted` is 1.
@@ -116,7 +90,7 @@ class Spreading {
 
   private:
     struct State {
-        Plane plane;
+        PixelPlane plane;
         float path = 0, cost = 0;
         bool open = false, fitted = false;
     };
@@ -125,63 +99,37 @@ class Spreading {
         return glm::vec3(glm::u8vec3(colours_.at(x, y))) * (1.0f / 255.0f);
     }
 
-    /// Finds the weights of the samples around a pixel.
+    /// Takes the samples around a pixel.
     void lookAround(int x, int y) {
         const glm::vec3 middle = colour(x, y);
-        std::size_t k = 0;
-        for (int j = 0; j < kSamplesASide; ++j) {
-            for (int i = 0; i < kSamplesASide; ++i, ++k) {
-                const int dx = (i - kSamplesASide / 2) * kSampleStep,
-                          dy = (j - kSamplesASide / 2) * kSampleStep;
-                const bool inside = q_.contains(x + dx, y + dy);
-                samples_[k] = inside ? colour(x + dx, y + dy) : glm::vec3(0.0f);
-                weights_[k] =
-                    inside ? std::exp(-apart(samples_[k], middle) * (1.0f / kAlikeColour)) : 0.0f;
-            }
+        for (std::size_t k = 0; k < PlaneSamples::kCount; ++k) {
+            const int i = x + static_cast<int>(samples_.dx[k]),
+                      j = y + static_cast<int>(samples_.dy[k]);
+            samples_.weight[k] = 0.0f;
+            if (!q_.contains(i, j)) continue;
+            const glm::vec3 c = colour(i, j);
+            samples_.red[k] = c.r;
+            samples_.green[k] = c.g;
+            samples_.blue[k] = c.b;
+            samples_.weight[k] = std::exp(-apart(c, middle) * (1.0f / kAlikeColour));
         }
     }
 
     /// By how much other views show something else, of a pixel that was looked around at.
-    [[nodiscard]] float difference(int x, int y, const Plane& plane) const {
+    [[nodiscard]] float difference(int x, int y, const PixelPlane& plane) const {
         std::array<float, kComparedViews> found;
         std::size_t count = 0;
-        for (const Side& other : others_) {
+        alignas(64) PlaneSamples::Floats off;
+        for (const OtherView& other : others_) {
+            differencesOn(plane, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f,
+                          samples_, other, off);
             float sum = 0, weight = 0, all = 0;
-            std::size_t k = 0;
-            const Warp& warp = other.warp;
-            const glm::vec4 middle = warp.homogeneous(static_cast<float>(x) + 0.5f,
-                                                      static_cast<float>(y) + 0.5f, plane.q);
-            const glm::vec4 alongX = warp.ofChange({1, 0, plane.gx, 0}),
-                            alongY = warp.ofChange({0, 1, plane.gy, 0});
-            for (int j = 0; j < kSamplesASide; ++j) {
-                for (int i = 0; i < kSamplesASide; ++i, ++k) {
-                    if (!(weights_[k] > 0.0f)) continue;
-                    all += weights_[k];
-                    const auto dx = static_cast<float>((i - kSamplesASide / 2) * kSampleStep),
-                               dy = static_cast<float>((j - kSamplesASide / 2) * kSampleStep);
-                    const float q = plane.q + plane.gx * dx + plane.gy * dy;
-                    if (!(q > 0.0f)) {
-                        sum += weights_[k] * kMostDifferent;
-                        weight += weights_[k];
-                        continue;
-                    }
-                    const glm::vec4 h = middle + dx * alongX + dy * alongY;
-                    if (!(h.w > 0.0f)) continue;
-                    const float inverse = 1.0f / h.w;
-                    const float u = h.x * inverse, v = h.y * inverse, there = h.z * inverse;
-                    if (!(u >= 0.0f && v >= 0.0f && u < static_cast<float>(other.q->width()) &&
-                          v < static_cast<float>(other.q->height())))
-                        continue;
-                    const float shown = other.q->at(static_cast<int>(u), static_cast<int>(v));
-                    if (shown > 0.0f && shown > there * (1.0f + kSamePlaceThere)) continue;
-                    const float off =
-                        shown > 0.0f && shown < there * (1.0f - kSamePlaceThere)
-                            ? kMostDifferent
-                            : std::min(apart(samples_[k], colourBetween(*other.colours, u, v)),
-                                       kMostDifferent);
-                    sum += weights_[k] * off;
-                    weight += weights_[k];
-                }
+            for (std::size_t k = 0; k < PlaneSamples::kCount; ++k) {
+                const float w = samples_.weight[k];
+                all += w;
+                if (off[k] < 0.0f) continue;
+                sum += w * off[k];
+                weight += w;
             }
             if (weight > 0.5f * all) found[count++] = sum / weight;
         }
@@ -195,7 +143,7 @@ class Spreading {
         return sum / static_cast<float>(best);
     }
 
-    [[nodiscard]] static bool isLike(const Plane& a, const Plane& b) {
+    [[nodiscard]] static bool isLike(const PixelPlane& a, const PixelPlane& b) {
         const float off = kSamePlane * a.q;
         return std::abs(a.q - b.q) < off && kPlaneRadius * std::abs(a.gx - b.gx) < off &&
                kPlaneRadius * std::abs(a.gy - b.gy) < off;
@@ -227,9 +175,9 @@ class Spreading {
             if (!known && !state_.at(nx, ny).open) continue;
             const State& from = known ? fitted(nx, ny) : state_.at(nx, ny);
             if (!known && from.plane.q == far_) continue;
-            const Plane plane{from.plane.q - from.plane.gx * static_cast<float>(dx) -
-                                  from.plane.gy * static_cast<float>(dy),
-                              from.plane.gx, from.plane.gy};
+            const PixelPlane plane{from.plane.q - from.plane.gx * static_cast<float>(dx) -
+                                       from.plane.gy * static_cast<float>(dy),
+                                   from.plane.gx, from.plane.gy};
             if (!(plane.q > far_) || isLike(plane, s.plane)) continue;
             const float path =
                 std::min(from.path + std::max(apart(own, colour(nx, ny)) - kNoiseOfColours, 0.0f),
@@ -247,13 +195,12 @@ class Spreading {
 
     const Rgba8Image& colours_;
     const Image<float>& q_;
-    std::vector<Side> others_;
+    std::vector<OtherView> others_;
     float far_;
     int width_;
     std::vector<glm::ivec2> pixels_;
     Image<State> state_;
-    std::array<glm::vec3, kSamplesASide * kSamplesASide> samples_{};
-    std::array<float, kSamplesASide * kSamplesASide> weights_{};
+    PlaneSamples samples_;
 };
 
 /// What all steps need to know of a view.
@@ -392,7 +339,7 @@ UnmeasuredDepth unmeasuredDepth(std::span<const RefineView> views,
     ofEach([&](std::size_t k) {
         const Looked& l = looked[k];
         if (l.wanted.empty()) return;
-        std::vector<Side> others;
+        std::vector<OtherView> others;
         for (const std::size_t i : nearViews(
                  views.size(),
                  [&](std::size_t n) -> const Camera& { return views[n].header->camera; }, k,

@@ -96,9 +96,8 @@ class SurfaceRenderer final : public Renderer {
     /// Draws what is behind where a frame is open.
     [[nodiscard]] Result<void> drawBehind(SurfaceRenderer& behind, const SurfaceFrame& work,
                                           Frame& frame, Image<float>& q);
-    /// Only those tiles of a frame, 32 pixels wide, that `wanted` has; its depth, too.
-    [[nodiscard]] Result<Frame> drawTiles(const Camera& camera,
-                                          std::span<const std::uint8_t> wanted);
+    /// Those pixels of a frame, and perhaps others; its depth, too.
+    [[nodiscard]] Result<Frame> drawPixels(const Camera& camera, std::vector<TilePixels> wanted);
     /// The view that is exactly the camera's, -1 = none.
     [[nodiscard]] int viewAt(const Camera& camera) const;
     [[nodiscard]] Frame copyOf(const Source& source) const;
@@ -367,17 +366,25 @@ Result<void> SurfaceRenderer::drawBehind(SurfaceRenderer& behind, const SurfaceF
                                          Frame& frame, Image<float>& q) {
     const PixelSpace& space = work.space;
     const int width = frame.colour.width(), height = frame.colour.height();
-    std::vector<std::uint8_t> open(static_cast<std::size_t>(work.tiles.count()), 0);
+    std::vector<TilePixels> wanted(static_cast<std::size_t>(work.tiles.count()), TilePixels{});
     bool any = false;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             if (frame.colour.at(x, y).a >= kCoveredInFull) continue;
-            open[static_cast<std::size_t>(work.tiles.at({x, y}))] = 1;
+            const int number = work.tiles.at({x, y});
+            TilePixels& tile = wanted[static_cast<std::size_t>(number)];
             any = true;
+            // What was measured may hide what is beside the open pixels, too.
+            if (behind.showsMeasured())
+                tile.fill(~0u);
+            else
+                tile[static_cast<std::size_t>(y - work.tiles.y(number))] |=
+                    1u << (x - work.tiles.x(number));
         }
     }
     if (!any) return {};
-    STX_TRY(const Frame background, behind.drawTiles(space.camera, open));
+    const StageTimer timer(settings_.log.get(), "behind");
+    STX_TRY(const Frame background, behind.drawPixels(space.camera, std::move(wanted)));
     const Image<float> before = depthOf(q, space.axis);
     frame.depth = before;
     putBehind(frame, background, [&](int x, int y, float depth) {
@@ -396,10 +403,9 @@ Result<void> SurfaceRenderer::drawBehind(SurfaceRenderer& behind, const SurfaceF
     return {};
 }
 
-Result<Frame> SurfaceRenderer::drawTiles(const Camera& camera,
-                                         std::span<const std::uint8_t> wanted) {
+Result<Frame> SurfaceRenderer::drawPixels(const Camera& camera, std::vector<TilePixels> wanted) {
     auto work = plan(camera);
-    keepTiles(*work, wanted);
+    keepPixels(*work, std::move(wanted));
     STX_CHECK(backend_->begin(*work));
     Frame frame;
     Image<float> q;

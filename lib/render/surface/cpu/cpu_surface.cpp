@@ -193,7 +193,10 @@ class GroupDrawer {
         pieces_.clear();
         const DepthAxis& axis = frame_->space.axis;
         const int tileX = frame_->tiles.x(tile_), tileY = frame_->tiles.y(tile_);
-        const TilePixels inside = pixelsInFrame(tileX, tileY, width, height);
+        TilePixels inside = pixelsInFrame(tileX, tileY, width, height);
+        if (!frame_->wanted.empty())
+            for (std::size_t y = 0; y < kTile; ++y)
+                inside[y] &= frame_->wanted[static_cast<std::size_t>(tile_)][y];
         const int core = frame_->tileCore[static_cast<std::size_t>(tile_)];
         if (!frame_->effort.settle) {
             drawSources(kAllSquares);

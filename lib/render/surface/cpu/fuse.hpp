@@ -7,6 +7,7 @@
 
 #include "lib/render/surface/cpu/raster.hpp"
 #include "lib/render/surface/cpu/settle.hpp"
+#include "lib/render/surface/plan/plan.hpp"
 #include "lib/render/surface/prepare/votes.hpp"
 
 namespace stx::surface {
@@ -25,9 +26,6 @@ struct Pieces {
     void resize(std::size_t size);
     [[nodiscard]] std::size_t size() const { return x.size(); }
 };
-
-/// Some pixels of a tile: bit x of row y.
-using TilePixels = std::array<std::uint32_t, kTile>;
 
 /// Those of the tile whose first pixel is (tileX, tileY) that are in a frame of this size.
 [[nodiscard]] TilePixels pixelsInFrame(int tileX, int tileY, int width, int height);

@@ -179,6 +179,11 @@ Ray rayFrom(const PixelSpace& eye, const PixelSpace& frame) {
 /// and 37.46; 8 and 1 28.05, 26.07 and 36.56.
 constexpr ShadeSettings kBlended{.kernel = 4.5f, .ridge = 0.03f, .edgeWeight = 1.0f};
 
+/// Samples along a side of a pixel of what has guessed planes (Stage::unmeasured). 4 take a quarter
+/// more of the time of a frame of the kitchen of 7-Scenes, and give pictures of it and of a room of
+/// Open3D between 0.09 dB less and 0.04 dB more.
+constexpr int kGuessedSamples = 2;
+
 Effort effortOf(const RenderSettings& settings, const SurfaceScene& scene) {
     Effort e;
     e.places = settings.does(Stage::places);
@@ -187,6 +192,7 @@ Effort effortOf(const RenderSettings& settings, const SurfaceScene& scene) {
     // More than 8 would look from so far aside that they cost as much as they add (pictures.md).
     if (settings.quality == Quality::best) e.moreGeometry = 8;
     if (scene.blends) e.shade = kBlended;
+    if (scene.set.farAway() > 0) e.samplesPerPixel = kGuessedSamples;
     double valid = 0;
     for (const Source& s : scene.sources)
         valid += s.validShare / static_cast<double>(scene.sources.size());
@@ -229,9 +235,10 @@ float SurfaceFrame::qLimit() const {
     return space.axis.nearest();
 }
 
-void keepTiles(SurfaceFrame& frame, std::span<const std::uint8_t> wanted) {
+void keepPixels(SurfaceFrame& frame, std::vector<TilePixels> wanted) {
     for (std::size_t t = 0; t < frame.tileSources.size(); ++t)
-        if (!wanted[t]) frame.tileSources[t].clear();
+        if (wanted[t] == TilePixels{}) frame.tileSources[t].clear();
+    frame.wanted = std::move(wanted);
 }
 
 Bounds boundsOf(const SurfaceScene& scene) {

@@ -62,6 +62,9 @@ struct FrameSource {
     }
 };
 
+/// Some pixels of a tile: bit x of row y.
+using TilePixels = std::array<std::uint32_t, kTile>;
+
 /// The tiles of a frame, of kTile x kTile pixels, row by row. One begins at the principal point: a
 /// part of a frame has the tiles of the whole, which choose the same sources.
 struct TileGrid {
@@ -73,6 +76,7 @@ struct TileGrid {
     /// The first pixel of a tile; those of the first ones may lie before the frame.
     [[nodiscard]] int x(int tile) const { return first.x + tile % size.x * kTile; }
     [[nodiscard]] int y(int tile) const { return first.y + tile / size.x * kTile; }
+    /// The tile of a pixel of the frame.
     [[nodiscard]] int at(glm::ivec2 pixel) const {
         const glm::ivec2 tile = (pixel - first) / kTile;
         return tile.y * size.x + tile.x;
@@ -90,6 +94,9 @@ struct SurfaceFrame {
     /// By tile: so many of them, the first, tell what it shows by themselves, too: the picture is
     /// the mean of that and of what all of them show. Those come in order, and so do the others.
     std::vector<int> tileCore;
+    /// By tile: the pixels that are wanted; empty: all are. Of a tile with some a backend may draw
+    /// more.
+    std::vector<TilePixels> wanted;
     Effort effort;
     bool wantOrigin = false;  ///< see DrawnFrame::origin
 
@@ -103,8 +110,8 @@ struct SurfaceFrame {
     [[nodiscard]] float qLimit() const;
 };
 
-/// Leaves out tiles, those of 0.
-void keepTiles(SurfaceFrame& frame, std::span<const std::uint8_t> wanted);
+/// Leaves out what is not wanted, by tile.
+void keepPixels(SurfaceFrame& frame, std::vector<TilePixels> wanted);
 
 /// World bounds of all blocks of all sources.
 [[nodiscard]] Bounds boundsOf(const SurfaceScene& scene);
