@@ -19,7 +19,7 @@ class StageLog {
   public:
     struct Entry {
         std::string name;  ///< of a stage, a step of refining, or one of "prepare", "plan", "draw",
-                           ///< "behind" (what is drawn where a frame is open)
+                           ///< "behind" (what is drawn where a frame is open), "light"
         double milliseconds = 0;  ///< of processors, all threads together
         std::int64_t pixels = 0;  ///< that it changed: of views (before drawing) or of frames
         bool once = false;        ///< for all frames

@@ -269,6 +269,7 @@ Frame SurfaceRenderer::copyOf(const Source& source) const {
 }
 
 void SurfaceRenderer::light(const Camera& camera, Frame& frame) const {
+    const StageTimer timer(settings_.log.get(), "light");
     const int width = frame.colour.width(), height = frame.colour.height();
     const Lighting lighting = lightsInWorld(settings_.lighting, camera.worldFromCamera());
     const glm::dmat3 worldFromCamera = glm::mat3_cast(camera.orientation);

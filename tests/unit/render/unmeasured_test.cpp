@@ -2,11 +2,13 @@
 
 #include "lib/refine/unmeasured.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "lib/packing/prune.hpp"
+#include "lib/render/api/stage_log.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/factory.hpp"
 
@@ -154,6 +156,18 @@ TEST(Unmeasured, ASkyIsDrawnThroughTheWindow) {
         }
         EXPECT_LT(withDepth, count / 5);
     }
+}
+
+TEST(Unmeasured, WhatIsDrawnBehindIsToldALog) {
+    RenderSettings settings;
+    settings.log = std::make_shared<StageLog>();
+    Job job;
+    const auto renderer = makeRenderer(Backend::cpu, walls(), settings, -1, job);
+    ASSERT_TRUE(renderer);
+    ASSERT_TRUE((*renderer)->render(wallCamera(0.04)));
+    EXPECT_TRUE(std::ranges::any_of(settings.log->entries(), [](const StageLog::Entry& e) {
+        return e.name == "behind" && !e.once;
+    }));
 }
 
 TEST(Unmeasured, ASkyIsDrawnOfPrunedViews) {
