@@ -53,22 +53,38 @@ bool isTranslucent(const Mesh& mesh, std::size_t material) {
     return false;
 }
 
-/// Says what becomes of glass: a view has one depth a pixel.
-void noteTranslucent(const Mesh& mesh, Job& job) {
+/// "material 'a' is", "material 'a' and 2 more are": those of which `what` is true; empty without.
+template <class What>
+std::string materialsAre(const Mesh& mesh, const What& what) {
     std::string first;
     int count = 0;
     for (std::size_t i = 0; i < mesh.materials.size(); ++i) {
-        if (!isTranslucent(mesh, i)) continue;
+        if (!what(i)) continue;
         if (count++ == 0) first = mesh.materials[i].name;
     }
-    if (count == 0) return;
-    job.note(fmt::format(
-        "material '{}'{} translucent: a pixel has the depth of the surface that shows most there; "
-        "its colour mixes all of them, its alpha says how much they hide",
-        first,
-        count == 1   ? " is"
-        : count == 2 ? " and one more are"
-                     : fmt::format(" and {} more are", count - 1)));
+    if (count == 0) return {};
+    return fmt::format("material '{}'{}", first,
+                       count == 1   ? " is"
+                       : count == 2 ? " and one more are"
+                                    : fmt::format(" and {} more are", count - 1));
+}
+
+/// Says what becomes of glass: a view has one depth a pixel.
+void noteTranslucent(const Mesh& mesh, Job& job) {
+    const auto which = materialsAre(mesh, [&](std::size_t i) { return isTranslucent(mesh, i); });
+    if (which.empty()) return;
+    job.note(which +
+             " translucent: a pixel has the depth of the surface that shows most there; its colour "
+             "mixes all of them, its alpha says how much they hide");
+}
+
+/// Says what views do not keep: that lights leave a colour as it is.
+void noteUnlit(const Mesh& mesh, Job& job) {
+    const auto which = materialsAre(mesh, [&](std::size_t i) { return mesh.materials[i].unlit; });
+    if (which.empty()) return;
+    job.note(which +
+             " unlit (KHR_materials_unlit), which views do not keep: --light of stx render lights "
+             "the colour like paint; drawn from the model itself it stays as it is");
 }
 
 }  // namespace
@@ -182,6 +198,7 @@ Result<Subject> subjectOf(const Mesh& whole, const std::vector<Camera>& cameras,
 
 void noteMaterials(const Mesh& mesh, const ViewImageKinds& kinds, const CaptureSettings& settings,
                    Job& job) {
+    noteUnlit(mesh, job);
     if (settings.materials && !kinds.hasMaterial())
         job.note(
             "the model has neither metallic-roughness nor emissive materials; "
