@@ -115,6 +115,7 @@ class Rasterizer {
     MaterialSampler sampler_;
     std::vector<glm::vec2> pixels_;  ///< of each vertex; NaN behind the viewpoint
     PixelSamples pixelSamples_;
+    mutable std::atomic<bool> cut_ = false;  ///< translucent surfaces that would show are left out
 };
 
 void Rasterizer::project() {
@@ -463,6 +464,8 @@ void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
                     add(tile.setUps[layer.slot], layer.colour, layer.alpha * through);
                     through *= 1.0f - layer.alpha;
                 }
+                if (through > kLeastAlpha && tile.layers.isCut(sample))
+                    cut_.store(true, std::memory_order_relaxed);
                 if (ids[sample] == kNone) continue;
                 const auto& s = tile.setUps[ids[sample]];
                 const auto* constant = sampler_.constantColour(s.triangle);
@@ -567,6 +570,11 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
         }
     });
     if (stopped) STX_CHECK(job.checkCancelled());
+    if (cut_)
+        job.noteOnce(fmt::format(
+            "a pixel shows the nearest {} translucent surfaces; more lie behind each other in the "
+            "model, and those behind are left out",
+            Layers::kMost));
     return out;
 }
 

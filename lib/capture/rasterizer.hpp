@@ -33,7 +33,8 @@ struct RasterImage {
 
 /// Rasterises a mesh (which must pass check()) exactly: no cracks along shared edges, no clipping
 /// artefacts, perspective-correct. Unlit base colour. Points of point clouds become discs that face
-/// the camera and close the gaps between neighbours. The same result on any number of threads.
+/// the camera and close the gaps between neighbours. A note says that more than Layers::kMost
+/// translucent surfaces lie behind each other. The same result on any number of threads.
 [[nodiscard]] Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
                                             const RasterSettings& settings, Job& job);
 
