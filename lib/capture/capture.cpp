@@ -15,12 +15,16 @@
 namespace stx {
 namespace {
 
-Texture straightTexture(const Image<glm::vec4>& premultiplied) {
+/// `clipped` becomes true where a colour is brighter than white by a step or more.
+Texture straightTexture(const Image<glm::vec4>& premultiplied, bool& clipped) {
+    constexpr float kWhite = 1.0f + 1.0f / 255.0f;
     Rgba8Image image(premultiplied.width(), premultiplied.height());
     for (std::size_t i = 0; i < image.count(); ++i) {
         const glm::vec4 c = premultiplied.pixels()[i];
         if (!(c.w > 0.0f)) continue;
-        const glm::vec3 straight = glm::clamp(glm::vec3(c) / c.w, 0.0f, 1.0f);
+        const glm::vec3 bright = glm::vec3(c) / c.w;
+        clipped = clipped || std::max({bright.x, bright.y, bright.z}) >= kWhite;
+        const glm::vec3 straight = glm::clamp(bright, 0.0f, 1.0f);
         // Any coverage at all stays above 0, which means background.
         const float alpha = std::max(1.0f, std::round(std::min(c.w, 1.0f) * 255.0f));
         image.pixels()[i] =
@@ -140,13 +144,18 @@ Result<ReferenceView> capturedView(const Mesh& mesh, const Camera& camera, std::
     raster.supersampling = settings.supersampling;
     raster.normals = settings.meshNormals;
     raster.materials = settings.materials;
+    raster.lighting.beyondOne = true;
     STX_TRY(auto image, rasterise(mesh, camera, raster, job));
     if (mesh.splats) faint.add(image);
     ReferenceView view;
     view.name = std::move(name);
     view.camera = camera;
     view.depthBits = settings.depthBits;
-    view.texture = straightTexture(image.colour);
+    bool clipped = false;
+    view.texture = straightTexture(image.colour, clipped);
+    // Harmonics of splats lead beyond white now and then, and viewers of them clip.
+    if (clipped && !mesh.splats)
+        job.noteOnce("what gives off more light than white is white in views, which have 8 bits");
     view.depth = std::move(image.depth);
     view.normal = std::move(image.normal);
     view.metallicRoughness = std::move(image.metallicRoughness);

@@ -580,6 +580,26 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
 
 }  // namespace
 
+namespace {
+
+/// What is brighter than white becomes white, under its coverage.
+void clip(Image<glm::vec4>& colour) {
+    parallelFor(0, colour.height(), 16, [&](int y) {
+        for (auto& c : colour.row(y)) c = glm::vec4(glm::min(glm::vec3(c), c.w), c.w);
+    });
+}
+
+Result<RasterImage> rasterisedMesh(const Mesh& mesh, const Camera& camera,
+                                   const RasterSettings& settings, Job& job) {
+    STX_TRY(auto out, Rasterizer(mesh, camera, settings).run(settings, job));
+    if (settings.lighting.beyondOne || !mayExceedWhite(mesh)) return out;
+    clip(out.colour);
+    clip(out.lit);
+    return out;
+}
+
+}  // namespace
+
 Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
                               const RasterSettings& settings, Job& job) {
     STX_CHECK(camera.check());
@@ -590,15 +610,16 @@ Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
                                          32, "the picture"));
     if (mesh.splats) {
         STX_TRY(auto drawn, drawSplats(*mesh.splats, camera, settings.normals, job));
+        if (!settings.lighting.beyondOne) clip(drawn.colour);
         const auto lit = settings.lighting.on() ? drawn.colour : Image<glm::vec4>();
         return RasterImage{drawn.colour, lit, drawn.depth, drawn.normal, {}, {}};
     }
     STX_CHECK(job.limits.checkAllocation(mesh.triangles.size(), sizeof(SetUp), "the mesh"));
     if (!mesh.points.empty()) {
         const Mesh solid = pointsAsTriangles(mesh, camera, loosePoints(mesh));
-        return Rasterizer(solid, camera, settings).run(settings, job);
+        return rasterisedMesh(solid, camera, settings, job);
     }
-    return Rasterizer(mesh, camera, settings).run(settings, job);
+    return rasterisedMesh(mesh, camera, settings, job);
 }
 
 }  // namespace stx
