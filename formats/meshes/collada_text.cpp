@@ -253,11 +253,13 @@ void TextureSets::resolve() {
         for (const auto* instance : instances) {
             std::vector<std::uint32_t> sets;
             for (const auto name : firsts) sets.push_back(setIn(*instance, name));
-            const auto [known, isNew] =
-                bound.emplace(std::pair(instance->geometry, instance->symbol), sets);
-            if (isNew || known->second == sets || !boundTwice_.empty() || firsts.empty()) continue;
-            const auto [here, there] = std::ranges::mismatch(sets, known->second);
-            boundTwice_ = firsts[std::min<std::size_t>(here - sets.begin(), firsts.size() - 1)];
+            auto& known = bound[{instance->geometry, instance->symbol}];
+            const auto [here, there] = std::ranges::mismatch(sets, known);
+            if (here == sets.end()) continue;
+            if (there == known.end())
+                known = std::move(sets);
+            else if (boundTwice_.empty())
+                boundTwice_ = firsts[static_cast<std::size_t>(here - sets.begin())];
         }
     }
     for (const Part& part : parts_)
@@ -267,7 +269,7 @@ void TextureSets::resolve() {
 
 /// Sets that nothing binds, or that the part does not have, are its first.
 void TextureSets::plan(const Part& part, const std::vector<std::uint32_t>& bound) {
-    if (part.inputs.empty()) return;
+    if (part.inputs.empty() || bound.empty()) return;
     const auto first = std::ranges::min(part.inputs);
     for (std::size_t number = 0; number < bound.size(); ++number) {
         const auto input = std::ranges::find(part.inputs, bound[number],
