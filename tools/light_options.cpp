@@ -38,6 +38,9 @@ Result<Light> parseLight(const std::string& text, glm::dvec3 origin) {
     const bool inWorld = light.kind == Light::Kind::point && !light.inCameraSpace;
     light.vector = glm::vec3(inWorld ? vector - origin : vector);
     if (v.size() == 6) light.colour = glm::vec3(v[3], v[4], v[5]);
+    if (glm::any(glm::lessThan(light.colour, glm::vec3(0.0f))))
+        return fail(ErrorCode::usage, "--light '{}' has a negative colour; light is 0 or more",
+                    text);
     if (light.kind == Light::Kind::directional && light.vector == glm::vec3(0.0f))
         return fail(ErrorCode::usage, "--light '{}' has no direction", text);
     return light;

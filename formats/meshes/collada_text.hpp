@@ -10,16 +10,17 @@ namespace stx {
 struct PlainCollada {
     std::string text;
     std::string wrap;        ///< of the first wrap_s or wrap_t that is not WRAP: Assimp ignores it
-    std::string boundTwice;  ///< the first semantic that is bound to sets that differ, if any
+    std::string boundTwice;  ///< the first semantic bound to sets that differ in one part, if any
 };
 
 /// Rewrites (COLLADA 1.4.1, chapter 5):
 ///  - `lookat` and `skew` as the `matrix` that they mean. Assimp takes the up of a lookat for an
 ///    axis as it is, which shears where it is not at right angles to the view, and ends itself at a
 ///    skew. What has too few numbers, and a lookat without a direction aside of its up, stay.
-///  - `texcoord` of textures as the number of the set of texture coordinates that
-///    `bind_vertex_input` gives it, counted among the sets of the file; 0 where none does. Assimp
-///    ignores what is bound, takes a number from the name, and leaves out sets that do not exist.
+///  - `texcoord` of textures as a number, and the sets of texture coordinates of each part of a
+///    geometry in the order of these numbers, as `bind_vertex_input` of its instance says; its
+///    lowest set where nothing does. Assimp ignores what is bound, takes a number from the name,
+///    and leaves out sets that do not exist.
 ///  - `wrap_s` and `wrap_t` of samplers, which Assimp ignores, as what Maya writes into textures.
 /// Errors (invalidInput): a skew whose angle reaches its axis of translation.
 [[nodiscard]] Result<PlainCollada> plainCollada(ByteSpan text);

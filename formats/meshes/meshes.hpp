@@ -33,11 +33,13 @@ struct MeshOptions {
 /// Mesh::splats. "-" reads stdin.
 ///
 /// The result has passed Mesh::check(): world space, all transforms applied, no triangle without
-/// area. `normals` is empty when the file has none: a triangle's own normal counts then. Colours of
-/// glTF are linear as the standard says; those of OBJ, MTL, PLY, STL and .drc are taken as sRGB, as
-/// the programs that write them do, and made linear. A material of a format without the notion is
-/// double-sided. Texture names resolve inside the model's folder only; what is named
-/// elsewhere is looked for beside the model and in `textures` there.
+/// area. Lengths are metres in glTF, COLLADA and FBX, whose units are applied (FBX: centimetres
+/// times UnitScaleFactor); in other formats they are as written. `normals` is empty when the file
+/// has none: a triangle's own normal counts then. Colours of glTF are linear as the standard says;
+/// those of OBJ, MTL, PLY, STL and .drc are taken as sRGB, as the programs that write them do, and
+/// made linear. A material of a format without the notion is double-sided. Texture names resolve
+/// inside the model's folder only; what is named elsewhere is looked for beside the model and in
+/// `textures` there.
 ///
 /// What is dropped (animations, lines, cameras, maps other than base colour, emission and normal, a
 /// texture that is missing or broken, properties of vertices that are not known, triangles without
@@ -45,7 +47,7 @@ struct MeshOptions {
 ///
 /// Errors: io (missing or unreadable file, missing buffer), invalidInput (a broken rule, named with
 /// the object it is in; neither triangles nor points; more than the memory limit), unsupported (a
-/// required glTF extension that is not known, glTF 1.0).
+/// required glTF extension that is not known, or is not drawn and would change what is; glTF 1.0).
 [[nodiscard]] Result<Mesh> readMesh(const std::filesystem::path& path, Job& job,
                                     const MeshOptions& options = {});
 

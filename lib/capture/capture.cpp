@@ -15,12 +15,16 @@
 namespace stx {
 namespace {
 
-Texture straightTexture(const Image<glm::vec4>& premultiplied) {
+/// `clipped` becomes true where a colour is brighter than white by a step or more.
+Texture straightTexture(const Image<glm::vec4>& premultiplied, bool& clipped) {
+    constexpr float kWhite = 1.0f + 1.0f / 255.0f;
     Rgba8Image image(premultiplied.width(), premultiplied.height());
     for (std::size_t i = 0; i < image.count(); ++i) {
         const glm::vec4 c = premultiplied.pixels()[i];
         if (!(c.w > 0.0f)) continue;
-        const glm::vec3 straight = glm::clamp(glm::vec3(c) / c.w, 0.0f, 1.0f);
+        const glm::vec3 bright = glm::vec3(c) / c.w;
+        clipped = clipped || std::max({bright.x, bright.y, bright.z}) >= kWhite;
+        const glm::vec3 straight = glm::clamp(bright, 0.0f, 1.0f);
         // Any coverage at all stays above 0, which means background.
         const float alpha = std::max(1.0f, std::round(std::min(c.w, 1.0f) * 255.0f));
         image.pixels()[i] =
@@ -53,22 +57,38 @@ bool isTranslucent(const Mesh& mesh, std::size_t material) {
     return false;
 }
 
-/// Says what becomes of glass: a view has one depth a pixel.
-void noteTranslucent(const Mesh& mesh, Job& job) {
+/// "material 'a' is", "material 'a' and 2 more are": those of which `what` is true; empty without.
+template <class What>
+std::string materialsAre(const Mesh& mesh, const What& what) {
     std::string first;
     int count = 0;
     for (std::size_t i = 0; i < mesh.materials.size(); ++i) {
-        if (!isTranslucent(mesh, i)) continue;
+        if (!what(i)) continue;
         if (count++ == 0) first = mesh.materials[i].name;
     }
-    if (count == 0) return;
-    job.note(fmt::format(
-        "material '{}'{} translucent: a pixel has the depth of the surface that shows most there; "
-        "its colour mixes all of them, its alpha says how much they hide",
-        first,
-        count == 1   ? " is"
-        : count == 2 ? " and one more are"
-                     : fmt::format(" and {} more are", count - 1)));
+    if (count == 0) return {};
+    return fmt::format("material '{}'{}", first,
+                       count == 1   ? " is"
+                       : count == 2 ? " and one more are"
+                                    : fmt::format(" and {} more are", count - 1));
+}
+
+/// Says what becomes of glass: a view has one depth a pixel.
+void noteTranslucent(const Mesh& mesh, Job& job) {
+    const auto which = materialsAre(mesh, [&](std::size_t i) { return isTranslucent(mesh, i); });
+    if (which.empty()) return;
+    job.note(which +
+             " translucent: a pixel has the depth of the surface that shows most there; its colour "
+             "mixes all of them, its alpha says how much they hide");
+}
+
+/// Says what views do not keep: that lights leave a colour as it is.
+void noteUnlit(const Mesh& mesh, Job& job) {
+    const auto which = materialsAre(mesh, [&](std::size_t i) { return mesh.materials[i].unlit; });
+    if (which.empty()) return;
+    job.note(which +
+             " unlit (KHR_materials_unlit), which views do not keep: --light of stx render lights "
+             "the colour like paint; drawn from the model itself it stays as it is");
 }
 
 }  // namespace
@@ -124,13 +144,18 @@ Result<ReferenceView> capturedView(const Mesh& mesh, const Camera& camera, std::
     raster.supersampling = settings.supersampling;
     raster.normals = settings.meshNormals;
     raster.materials = settings.materials;
+    raster.lighting.beyondOne = true;
     STX_TRY(auto image, rasterise(mesh, camera, raster, job));
     if (mesh.splats) faint.add(image);
     ReferenceView view;
     view.name = std::move(name);
     view.camera = camera;
     view.depthBits = settings.depthBits;
-    view.texture = straightTexture(image.colour);
+    bool clipped = false;
+    view.texture = straightTexture(image.colour, clipped);
+    // Harmonics of splats lead beyond white now and then, and viewers of them clip.
+    if (clipped && !mesh.splats)
+        job.noteOnce("what gives off more light than white is white in views, which have 8 bits");
     view.depth = std::move(image.depth);
     view.normal = std::move(image.normal);
     view.metallicRoughness = std::move(image.metallicRoughness);
@@ -182,6 +207,7 @@ Result<Subject> subjectOf(const Mesh& whole, const std::vector<Camera>& cameras,
 
 void noteMaterials(const Mesh& mesh, const ViewImageKinds& kinds, const CaptureSettings& settings,
                    Job& job) {
+    noteUnlit(mesh, job);
     if (settings.materials && !kinds.hasMaterial())
         job.note(
             "the model has neither metallic-roughness nor emissive materials; "

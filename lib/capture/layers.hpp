@@ -13,6 +13,9 @@ namespace stx {
 /// The translucent surfaces at each sample of a tile, from the nearest on.
 class Layers {
   public:
+    /// What lies behind so many surfaces is left out: a file may stack millions. 40 MB for a tile.
+    static constexpr std::size_t kMost = 64;
+
     struct Layer {
         float nearness = 0;  ///< as of opaque surfaces
         float alpha = 0;     ///< 0..1
@@ -24,6 +27,7 @@ class Layers {
     /// Forgets all; `samples` = 0 as long as a tile has no translucent surface.
     void reset(std::size_t samples) {
         counts_.assign(samples, 0);
+        cut_.assign(samples, false);
         layers_.resize(samples * most_);
     }
     [[nodiscard]] bool empty() const { return counts_.empty(); }
@@ -31,6 +35,9 @@ class Layers {
         if (counts_.empty()) return {};
         return {layers_.data() + sample * most_, counts_[sample]};
     }
+
+    /// Whether surfaces behind the last one of a sample were left out.
+    [[nodiscard]] bool isCut(std::size_t sample) const { return !cut_.empty() && cut_[sample]; }
 
     void add(std::size_t sample, const Layer& layer) {
         if (counts_[sample] == most_ && most_ < kMost) makeRoom();
@@ -41,9 +48,11 @@ class Layers {
             if (isSame(first[at], layer) || first[at].alpha >= kOpaque) return;
         }
         if (at < count && isSame(first[at], layer)) return;
+        if (count == most_) cut_[sample] = true;
         if (at == most_) return;
         if (layer.alpha >= kOpaque) {
             count = static_cast<std::uint8_t>(at + 1);
+            cut_[sample] = false;
         } else {
             const std::size_t last = std::min<std::size_t>(count, most_ - 1);
             std::move_backward(first + at, first + last, first + last + 1);
@@ -53,8 +62,6 @@ class Layers {
     }
 
   private:
-    /// What lies behind so many surfaces is left out: a file may stack millions. 40 MB for a tile.
-    static constexpr std::size_t kMost = 64;
     static constexpr float kOpaque = 0.998f;
 
     /// A sample on the edge of two triangles is inside of both, but sees one surface.
@@ -77,6 +84,7 @@ class Layers {
     std::size_t most_ = 8;  ///< of a sample
     std::vector<Layer> layers_;
     std::vector<std::uint8_t> counts_;
+    std::vector<bool> cut_;
 };
 
 }  // namespace stx

@@ -79,6 +79,14 @@ bool emits(const Mesh& mesh) {
                        [](const Material& m) { return m.emissive != glm::vec3(0.0f); });
 }
 
+bool mayExceedWhite(const Mesh& mesh) {
+    const auto exceeds = [](glm::vec3 c) { return std::max({c.x, c.y, c.z}) > 1.0f; };
+    return emits(mesh) ||
+           std::ranges::any_of(mesh.materials,
+                               [&](const Material& m) { return exceeds(m.baseColour); }) ||
+           std::ranges::any_of(mesh.colours, exceeds);
+}
+
 MaterialSampler::MaterialSampler(const Mesh& mesh, Glow glow) : mesh_(mesh), glow_(glow) {
     for (const auto& m : mesh.materials) {
         seeThrough_.push_back(m.alpha == Material::Alpha::mask);
@@ -88,8 +96,8 @@ MaterialSampler::MaterialSampler(const Mesh& mesh, Glow glow) : mesh_(mesh), glo
         constant_.push_back(mesh.colours.empty() && m.baseColourTexture < 0 &&
                             (!shines || m.emissiveTexture < 0));
         const auto light = glm::vec3(m.baseColour) + (shines ? m.emissive : glm::vec3(0.0f));
-        constantColour_.emplace_back(srgbByTable(light.x), srgbByTable(light.y),
-                                     srgbByTable(light.z));
+        constantColour_.emplace_back(srgbBeyondOne(light.x), srgbBeyondOne(light.y),
+                                     srgbBeyondOne(light.z));
     }
 }
 
@@ -111,7 +119,7 @@ glm::vec4 MaterialSampler::colour(std::uint32_t triangle, glm::vec3 b, Glow wher
     glm::vec4 out;
     for (int k = 0; k < 3; ++k) {
         const float light = (m.baseColourTexture >= 0 ? linearByTable(texel[k]) : 1.0f) * factor[k];
-        out[k] = srgbByTable(light + glow[k]);
+        out[k] = srgbBeyondOne(light + glow[k]);
     }
     out.w = texel.w * factor.w;
     return out;
@@ -140,7 +148,7 @@ glm::vec3 MaterialSampler::lit(const Lighting& lighting, std::uint32_t triangle,
     glm::vec3 out = shadePhong(lighting, bare, position, n, toEye, false);
     for (int k = 0; k < 3; ++k) {
         const float light = linearFromSrgb(out[k]) + glow[k];
-        out[k] = lighting.beyondOne ? srgbFromLinear(light) : srgbByTable(light);
+        out[k] = srgbBeyondOne(light);
     }
     return out;
 }

@@ -14,6 +14,9 @@ namespace stx {
 /// Some material gives off light.
 [[nodiscard]] bool emits(const Mesh& mesh);
 
+/// Some colour can be brighter than white, by what is given off or by factors above 1.
+[[nodiscard]] bool mayExceedWhite(const Mesh& mesh);
+
 /// Where the light goes that a material gives off.
 enum class Glow { inColour, apart };
 
@@ -23,7 +26,7 @@ class MaterialSampler {
     /// The mesh must pass check() and outlive the sampler.
     explicit MaterialSampler(const Mesh& mesh, Glow glow = Glow::inColour);
 
-    /// Straight sRGB-coded RGBA, 0..1, at barycentric coordinates of a triangle.
+    /// Straight sRGB-coded RGBA, 0 or more, at barycentric coordinates of a triangle.
     [[nodiscard]] glm::vec4 colour(std::uint32_t triangle, glm::vec3 barycentric) const;
     /// Metallic and roughness, 0..1; 0 and 1 where the material does not say them.
     [[nodiscard]] glm::vec2 metallicRoughness(std::uint32_t triangle, glm::vec3 barycentric) const;

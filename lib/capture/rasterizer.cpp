@@ -115,6 +115,7 @@ class Rasterizer {
     MaterialSampler sampler_;
     std::vector<glm::vec2> pixels_;  ///< of each vertex; NaN behind the viewpoint
     PixelSamples pixelSamples_;
+    mutable std::atomic<bool> cut_ = false;  ///< translucent surfaces that would show are left out
 };
 
 void Rasterizer::project() {
@@ -463,6 +464,8 @@ void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
                     add(tile.setUps[layer.slot], layer.colour, layer.alpha * through);
                     through *= 1.0f - layer.alpha;
                 }
+                if (through > kLeastAlpha && tile.layers.isCut(sample))
+                    cut_.store(true, std::memory_order_relaxed);
                 if (ids[sample] == kNone) continue;
                 const auto& s = tile.setUps[ids[sample]];
                 const auto* constant = sampler_.constantColour(s.triangle);
@@ -567,6 +570,31 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
         }
     });
     if (stopped) STX_CHECK(job.checkCancelled());
+    if (cut_)
+        job.noteOnce(fmt::format(
+            "a pixel shows the nearest {} translucent surfaces; more lie behind each other in the "
+            "model, and those behind are left out",
+            Layers::kMost));
+    return out;
+}
+
+}  // namespace
+
+namespace {
+
+/// What is brighter than white becomes white, under its coverage.
+void clip(Image<glm::vec4>& colour) {
+    parallelFor(0, colour.height(), 16, [&](int y) {
+        for (auto& c : colour.row(y)) c = glm::vec4(glm::min(glm::vec3(c), c.w), c.w);
+    });
+}
+
+Result<RasterImage> rasterisedMesh(const Mesh& mesh, const Camera& camera,
+                                   const RasterSettings& settings, Job& job) {
+    STX_TRY(auto out, Rasterizer(mesh, camera, settings).run(settings, job));
+    if (settings.lighting.beyondOne || !mayExceedWhite(mesh)) return out;
+    clip(out.colour);
+    clip(out.lit);
     return out;
 }
 
@@ -582,15 +610,16 @@ Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
                                          32, "the picture"));
     if (mesh.splats) {
         STX_TRY(auto drawn, drawSplats(*mesh.splats, camera, settings.normals, job));
+        if (!settings.lighting.beyondOne) clip(drawn.colour);
         const auto lit = settings.lighting.on() ? drawn.colour : Image<glm::vec4>();
         return RasterImage{drawn.colour, lit, drawn.depth, drawn.normal, {}, {}};
     }
     STX_CHECK(job.limits.checkAllocation(mesh.triangles.size(), sizeof(SetUp), "the mesh"));
     if (!mesh.points.empty()) {
         const Mesh solid = pointsAsTriangles(mesh, camera, loosePoints(mesh));
-        return Rasterizer(solid, camera, settings).run(settings, job);
+        return rasterisedMesh(solid, camera, settings, job);
     }
-    return Rasterizer(mesh, camera, settings).run(settings, job);
+    return rasterisedMesh(mesh, camera, settings, job);
 }
 
 }  // namespace stx

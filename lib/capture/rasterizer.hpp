@@ -14,15 +14,19 @@ struct RasterSettings {
     bool normals = false;  ///< also the surface normals at the pixel centres
     /// Also metallic-roughness and emissive at the pixel centres; colour is then without emission.
     bool materials = false;
-    Lighting lighting;  ///< in the world; when on, RasterImage::lit is made as well
+    /// In the world; when on, RasterImage::lit is made as well. `beyondOne` counts without lights,
+    /// too.
+    Lighting lighting;
 };
 
 /// A mesh seen by a camera. Depth and normal belong to the pixel's centre exactly; colour and
 /// coverage are box-filtered over the pixel, so an edge pixel can have coverage but no depth.
 struct RasterImage {
-    Image<glm::vec4> colour;  ///< sRGB-coded, premultiplied by coverage (alpha), 0..1
-    Image<glm::vec4> lit;     ///< the same under RasterSettings::lighting; empty when that is off
-    Image<float> depth;       ///< planar distance; kNoDepth where the centre misses
+    /// sRGB-coded, premultiplied by coverage (alpha), 0..1; what is brighter than white is clipped
+    /// when all surfaces are blended, or goes on beyond 1 (Lighting::beyondOne).
+    Image<glm::vec4> colour;
+    Image<glm::vec4> lit;  ///< the same under RasterSettings::lighting; empty when that is off
+    Image<float> depth;    ///< planar distance; kNoDepth where the centre misses
     /// Unit, world, of the side that is seen (MaterialSampler::normal()); zero where none; may be
     /// empty.
     Image<glm::vec3> normal;
@@ -33,7 +37,8 @@ struct RasterImage {
 
 /// Rasterises a mesh (which must pass check()) exactly: no cracks along shared edges, no clipping
 /// artefacts, perspective-correct. Unlit base colour. Points of point clouds become discs that face
-/// the camera and close the gaps between neighbours. The same result on any number of threads.
+/// the camera and close the gaps between neighbours. A note says that more than Layers::kMost
+/// translucent surfaces lie behind each other. The same result on any number of threads.
 [[nodiscard]] Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
                                             const RasterSettings& settings, Job& job);
 

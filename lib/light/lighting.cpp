@@ -36,10 +36,9 @@ struct Phong {
     [[nodiscard]] float brightest() const {
         return lighting.beyondOne ? std::numeric_limits<float>::max() : 1.0f;
     }
-    [[nodiscard]] static float coded(float c) {
-        return c > 1.0f ? srgbFromLinear(c) : srgbByTable(c);
+    [[nodiscard]] static vec3 coded(vec3 c) {
+        return {srgbBeyondOne(c.x), srgbBeyondOne(c.y), srgbBeyondOne(c.z)};
     }
-    [[nodiscard]] static vec3 coded(vec3 c) { return {coded(c.x), coded(c.y), coded(c.z)}; }
 #include "shaders/shared/phong.glsl"
 };
 

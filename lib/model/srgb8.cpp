@@ -45,6 +45,10 @@ float srgbByTable(float linear) {
     return table[i] + (table[i + 1] - table[i]) * (s - i);
 }
 
+float srgbBeyondOne(float linear) {
+    return linear > 1.0f ? srgbFromLinear(linear) : srgbByTable(linear);
+}
+
 float linearByTable(float coded) {
     return linearTable().linear(coded);
 }

@@ -45,6 +45,8 @@ class Srgb8Tables {
 /// srgbFromLinear() and linearFromSrgb() of values 0..1 (others are clamped), by tables: within a
 /// thousandth of an 8-bit step, and many times faster.
 [[nodiscard]] float srgbByTable(float linear);
+/// The same of values above 1, too, where the curve goes on.
+[[nodiscard]] float srgbBeyondOne(float linear);
 [[nodiscard]] float linearByTable(float coded);
 
 /// The table of linearByTable(), for loops over pixels; linearTable() gives the only one.

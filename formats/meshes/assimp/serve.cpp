@@ -208,6 +208,21 @@ class SceneTeller {
         return glm::determinant(rows) == 1.0f ? glm::mat4(glm::transpose(rows)) : none;
     }
 
+    /// Of the root: axes and units of FBX become ours, metres. Newer versions of Assimp turn the
+    /// root themselves, and bring it to FBX's own unit, the centimetre.
+    [[nodiscard]] glm::mat4 worldFromRoot(const glm::mat4& given) const {
+        double centimetres = 0;
+        if (!scene_.mMetaData) return given;
+        float single = 0;
+        if (scene_.mMetaData->Get("UnitScaleFactor", single))
+            centimetres = single;
+        else if (!scene_.mMetaData->Get("UnitScaleFactor", centimetres))
+            return given;
+        const bool done = given != glm::mat4(1.0f);
+        const auto metres = static_cast<float>((done ? 1.0 : centimetres) * 0.01);
+        return glm::mat4(glm::mat3(metres)) * (done ? given : worldFromFile());
+    }
+
     static int uvSetOf(const aiMaterial& material, aiTextureType type) {
         int set = 0;
         material.Get(AI_MATKEY_UVWSRC(type, 0), set);
@@ -232,9 +247,7 @@ class SceneTeller {
         nodeOf_.emplace(node.mName.C_Str(), self);
         to.put(parent);
         const glm::mat4 parentFromNode = toMatrix(node.mTransformation);
-        // Newer versions of Assimp turn the root themselves.
-        const bool turns = parent < 0 && parentFromNode == glm::mat4(1.0f);
-        to.put(turns ? worldFromFile() : parentFromNode);
+        to.put(parent < 0 ? worldFromRoot(parentFromNode) : parentFromNode);
         to.putBytes(std::as_bytes(std::span(node.mMeshes, node.mNumMeshes)));
         for (unsigned i = 0; i < node.mNumChildren; ++i) putNode(*node.mChildren[i], self, to);
     }

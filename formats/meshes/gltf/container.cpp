@@ -14,12 +14,13 @@ std::uint32_t readU32(ByteSpan bytes, std::size_t at) {
     return value;
 }
 
-/// Extensions that are read, or that add nothing to shape and base colour.
+/// Extensions that are read, or that add nothing to shape and base colour; of those that are not
+/// read, what uses them is asked for by GltfFile::mayLack().
 constexpr std::string_view kKnownExtensions[] = {
     "KHR_draco_mesh_compression",
     "KHR_gaussian_splatting",
     "KHR_mesh_quantization",
-    "KHR_texture_basisu",  // not read: a note, and the plain colour
+    "KHR_texture_basisu",  // not read: mayLack()
     "KHR_texture_transform",
     "KHR_materials_unlit",
     "KHR_materials_pbrSpecularGlossiness",
@@ -31,7 +32,7 @@ constexpr std::string_view kKnownExtensions[] = {
     "KHR_materials_specular",
     "KHR_materials_anisotropy",
     "KHR_materials_dispersion",
-    "KHR_materials_transmission",  // not read: a note, and the surface is opaque
+    "KHR_materials_transmission",  // not read: mayLack()
     "KHR_materials_volume",
     "KHR_materials_variants",
     "KHR_lights_punctual",
@@ -160,8 +161,18 @@ Result<void> GltfFile::checkAsset() {
                 "the file requires the glTF extension {}, which is not known here; export it "
                 "without",
                 text);
+        required_.insert(text);
     }
     return {};
+}
+
+Result<void> GltfFile::mayLack(std::string_view extension, std::string_view where,
+                               std::string_view wayOut) const {
+    if (!required_.contains(extension)) return {};
+    return fail(ErrorCode::unsupported,
+                "{} needs the glTF extension {}, which the file requires and which is not drawn "
+                "here; {}",
+                where, extension, wayOut);
 }
 
 Result<Bytes> GltfFile::uri(const std::string& uri, const std::string& user) {

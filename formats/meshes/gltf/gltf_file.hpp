@@ -3,6 +3,8 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -51,6 +53,10 @@ class GltfFile {
     /// Unsigned SCALARs.
     [[nodiscard]] Result<std::vector<std::uint32_t>> indices(std::uint64_t index,
                                                              const std::string& user);
+    /// For extensions that are known and not read, where leaving one out changes the picture.
+    /// Errors (unsupported): the file requires it (glTF 2.0, 3.12); `wayOut` ends the sentence.
+    [[nodiscard]] Result<void> mayLack(std::string_view extension, std::string_view where,
+                                       std::string_view wayOut) const;
     /// Bytes of a data: URI or of a file beside the model.
     [[nodiscard]] Result<Bytes> uri(const std::string& uri, const std::string& user);
 
@@ -70,6 +76,7 @@ class GltfFile {
     [[nodiscard]] Result<std::vector<Component>> elements(const Layout& layout);
 
     Json root_;
+    std::set<std::string, std::less<>> required_;  ///< extensions
     ByteSpan binaryChunk_;
     bool hasBinaryChunk_ = false;
     std::vector<std::optional<ByteSpan>> buffers_;

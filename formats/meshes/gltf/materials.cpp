@@ -168,6 +168,9 @@ Result<std::optional<std::uint64_t>> Materials::imageOf(const Json& texture,
         if (webpSource) source = webpSource;
     }
     STX_TRY(const Json* basis, getExtension(texture, "KHR_texture_basisu", where));
+    if (!source && basis)
+        STX_CHECK(model_.mayLack("KHR_texture_basisu", where,
+                                 "export PNG or JPEG textures, or give one with --texture"));
     if (!source)
         model_.job().note(
             basis ? fmt::format(
@@ -292,7 +295,10 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
     if (glass) {
         STX_TRY(const auto factor, getNumber(*glass, "transmissionFactor",
                                              where + ".extensions.KHR_materials_transmission"));
-        if (factor.value_or(0.0) > 0.0) ++dropped["transmission of materials"];
+        if (factor.value_or(0.0) > 0.0) {
+            STX_CHECK(model_.mayLack("KHR_materials_transmission", where, "export it without"));
+            ++dropped["transmission of materials"];
+        }
     }
     STX_TRY(const Json* unlit, getExtension(*object, "KHR_materials_unlit", where));
     m.unlit = unlit != nullptr;

@@ -128,6 +128,7 @@ TEST(CapturedMaterials, LightIsInTheColourOrApart) {
     ASSERT_TRUE(captureBundle(square(Material(), {}), {before()}, {}, job));
     EXPECT_TRUE(job.takeNotes().empty());
     Material glows;
+    glows.baseColour = glm::vec4(glm::vec3(0.25f), 1.0f);
     glows.emissive = glm::vec3(0.5f);
     ASSERT_TRUE(captureBundle(square(glows, {}), {before()}, {}, job));
     const auto notes = job.takeNotes();
@@ -135,6 +136,10 @@ TEST(CapturedMaterials, LightIsInTheColourOrApart) {
     EXPECT_EQ(notes[0],
               "what gives off light has it in its colour, which --light of stx render dims like "
               "paint; drawn from the model itself it shines");
+    glows.emissive = glm::vec3(1.5f);
+    ASSERT_TRUE(captureBundle(square(glows, {}), {before()}, {}, job));
+    EXPECT_EQ(job.takeNotes().back(),
+              "what gives off more light than white is white in views, which have 8 bits");
     const auto together = plain.views.at(0).texture.rgba8()->at(4, 8);
     EXPECT_EQ(together.r, 255);
     EXPECT_NEAR(together.b, base, 1);

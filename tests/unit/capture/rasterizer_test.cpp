@@ -212,6 +212,40 @@ TEST(Rasterise, LightThatASurfaceGivesOffIsAddedToWhatFallsOnIt) {
     EXPECT_NEAR(litMiddle(), 0.2f, 1e-3f);
 }
 
+TEST(Rasterise, LightBeyondWhiteIsKeptOrClippedAfterBlending) {
+    // A sheet that shines three times as bright as white hides half of a black one.
+    Mesh mesh;
+    for (const float z : {0.0f, 1.0f}) {
+        const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+        mesh.positions.insert(mesh.positions.end(),
+                              {{-2, -2, z}, {2, -2, z}, {2, 2, z}, {-2, 2, z}});
+        mesh.triangles.insert(mesh.triangles.end(),
+                              {{first, first + 1, first + 2}, {first, first + 2, first + 3}});
+    }
+    mesh.triangleMaterial = {0, 0, 1, 1};
+    Material black, shining;
+    black.baseColour = shining.baseColour = {0, 0, 0, 1};
+    shining.emissive = glm::vec3(3, 1, 0);
+    mesh.materials = {black, shining};
+    const auto middle = [&](float alpha, bool beyondOne) {
+        mesh.materials[1].baseColour.a = alpha;
+        mesh.materials[1].alpha = alpha < 1 ? Material::Alpha::blend : Material::Alpha::opaque;
+        RasterSettings settings;
+        settings.lighting.beyondOne = beyondOne;
+        Job job;
+        const auto image = rasterise(mesh, lookingAt({0, 0, 4}, 16), settings, job);
+        EXPECT_TRUE(image) << image.error().text();
+        return image ? image->colour.at(8, 8) : glm::vec4(-1.0f);
+    };
+    const float three = srgbFromLinear(3.0f);
+    EXPECT_NEAR(middle(1, true).x, three, 1e-5f);
+    EXPECT_NEAR(middle(1, true).y, 1, 1e-5f);
+    EXPECT_NEAR(middle(0.4f, true).x, 0.4f * three, 1e-5f);
+    EXPECT_EQ(middle(1, false), glm::vec4(1, 1, 0, 1));
+    EXPECT_NEAR(middle(0.4f, false).x, 0.4f * three, 1e-5f) << "not clipped before it is blended";
+    EXPECT_EQ(middle(0.9f, false).x, 1.0f);
+}
+
 TEST(Rasterise, AlphaMaskCutsHoles) {
     Mesh m;
     Material cut;

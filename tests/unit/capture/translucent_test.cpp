@@ -117,6 +117,25 @@ TEST(Translucent, OneHalfDoesNotSpeckleBesideVertexColours) {
     }
 }
 
+TEST(Translucent, MoreLayersThanAreHeldAreSaidOnceWhereTheyWouldShow) {
+    const auto notesOf = [](int count, float alpha) {
+        std::vector<std::pair<float, glm::vec4>> sheets;
+        for (int i = 0; i < count; ++i)
+            sheets.emplace_back(0.01f * static_cast<float>(i), withAlpha(kRed, alpha));
+        Job job;
+        for (int picture = 0; picture < 2; ++picture)
+            EXPECT_TRUE(rasterise(squares(sheets), above(), {}, job));
+        return job.takeNotes();
+    };
+    EXPECT_TRUE(notesOf(64, 0.01f).empty());
+    EXPECT_TRUE(notesOf(100, 0.3f).empty()) << "the 64 nearest hide what is behind";
+    const auto notes = notesOf(65, 0.01f);
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_EQ(notes[0],
+              "a pixel shows the nearest 64 translucent surfaces; more lie behind each other in "
+              "the model, and those behind are left out");
+}
+
 /// Glass, leaves or smoke of many sheets, in any order of the file.
 TEST(Translucent, ManyLayersHideWhatTheyDoTogether) {
     Job job;

@@ -125,6 +125,58 @@ TEST(Collada, TexturesHaveTheSetOfCoordinatesThatIsBound) {
                   0.25f);
 }
 
+/// Two geometries that share a material with one texture, 'UV', each with the sets and the binding
+/// as given; (0.25, 0.5) and (0.75, 0.5) all over the first and the second set.
+std::string colladaOfTwo(std::array<int, 2> setsOfFirst, int boundInFirst,
+                         std::array<int, 2> setsOfSecond, int boundInSecond) {
+    const auto bind = [](int set) {
+        return fmt::format(
+            R"(<bind_vertex_input semantic="UV" input_semantic="TEXCOORD" input_set="{}"/>)", set);
+    };
+    std::string text =
+        colladaWithSets(setsOfFirst[0], setsOfFirst[1], bind(boundInFirst), "", "UV");
+    const std::string other =
+        colladaWithSets(setsOfSecond[0], setsOfSecond[1], bind(boundInSecond), "", "UV");
+    const auto part = [](const std::string& of, const std::string& from, const std::string& to) {
+        const auto at = of.find(from);
+        return of.substr(at, of.find(to, at) + to.size() - at);
+    };
+    std::string geometry = part(other, "<geometry", "</geometry>");
+    for (const char* id : {"g", "p", "v", "u0", "u1", "a", "u0a", "u1a"}) {
+        for (const auto& [before, after] : {std::pair{"\"", "\""}, {"#", "\""}}) {
+            const auto from = before + std::string(id) + after;
+            for (auto at = geometry.find(from); at != std::string::npos;
+                 at = geometry.find(from, at + 1))
+                geometry.replace(at, from.size(), before + (std::string("h") + id) + after);
+        }
+    }
+    std::string instance = part(other, "<node>", "</node>");
+    instance.replace(instance.find("#g"), 2, "#hg");
+    text.insert(text.find("</library_geometries>"), geometry);
+    text.insert(text.find("</visual_scene>"), instance);
+    return text;
+}
+
+TEST(Collada, SetsAreThoseOfEachMesh) {
+    // The u of the first mesh, then that of the second.
+    const auto u = [](const std::string& text) {
+        const auto model = readGoodText(text, "a.dae");
+        EXPECT_FALSE(model.hasNote("bound to several sets"));
+        if (model.mesh.uvs.size() != 6) return glm::vec2(-1.0f);
+        return glm::vec2(model.mesh.uvs[0].x, model.mesh.uvs[3].x);
+    };
+    EXPECT_EQ(u(colladaOfTwo({0, 1}, 0, {0, 1}, 0)), glm::vec2(0.25f, 0.25f));
+    EXPECT_EQ(u(colladaOfTwo({0, 1}, 1, {1, 2}, 1)), glm::vec2(0.75f, 0.25f)) << "other sets";
+    EXPECT_EQ(u(colladaOfTwo({0, 1}, 0, {0, 1}, 1)), glm::vec2(0.25f, 0.75f)) << "other bindings";
+    EXPECT_EQ(u(colladaOfTwo({3, 5}, 5, {0, 1}, 0)), glm::vec2(0.75f, 0.25f));
+    // One geometry that is bound in two ways has the first, and that is said.
+    auto twice = colladaOfTwo({0, 1}, 1, {0, 1}, 0);
+    twice.replace(twice.find("#hg"), 3, "#g");
+    const auto model = readGoodText(twice, "a.dae");
+    EXPECT_TRUE(model.hasNote("'UV' is bound to several sets of texture coordinates"));
+    EXPECT_EQ(model.mesh.uvs.at(0).x, 0.75f);
+}
+
 TEST(Collada, SamplersWrap) {
     TemporaryFolder folder;
     const std::vector<std::uint8_t> grey(4, 128);

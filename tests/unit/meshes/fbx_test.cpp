@@ -5,9 +5,14 @@
 namespace stx {
 namespace {
 
+std::string unitOf(double centimetres) {
+    return fmt::format("\t\tP: \"UnitScaleFactor\", \"double\", \"Number\", \"\",{}\n",
+                       centimetres);
+}
+
 /// A triangle (0, 0, 0), (1, 0, 0), (0, 1, 0) of FBX, as text, whose node is at (0, 0, 2).
 ReadModel fbxOf(const std::string& globals, const std::string& objects = "",
-                const std::string& connections = "") {
+                const std::string& connections = "", const std::string& unit = unitOf(100)) {
     return readGoodText(
         R"(; FBX 7.4.0 project file
 FBXHeaderExtension:  {
@@ -17,6 +22,7 @@ GlobalSettings:  {
 	Version: 1000
 	Properties70:  {
 )" + globals +
+            unit +
             R"(
 	}
 }
@@ -86,6 +92,28 @@ TEST(Fbx, SkinsAreInThePoseOfTheirBones) {
 	C: "OO",60,50
 	C: "OO",40,60)");
     expectCornersAt(model, {glm::dvec3(0, 3, 2), {1, 0, 2}, {0, 4, 2}});
+}
+
+TEST(Fbx, UnitsBecomeMetres) {
+    const auto with = [](const std::string& unit, const std::string& axes = "") {
+        return fbxOf(axes, "", "", unit);
+    };
+    expectCornersAt(with(unitOf(1)), {glm::dvec3(0, 0, 0.02), {0.01, 0, 0.02}, {0, 0.01, 0.02}});
+    expectCornersAt(with(unitOf(100)), {glm::dvec3(0, 0, 2), {1, 0, 2}, {0, 1, 2}});
+    expectCornersAt(with(unitOf(2.54)),
+                    {glm::dvec3(0, 0, 0.0508), {0.0254, 0, 0.0508}, {0, 0.0254, 0.0508}});
+    // FBX's own unit is the centimetre.
+    expectCornersAt(with(""), {glm::dvec3(0, 0, 0.02), {0.01, 0, 0.02}, {0, 0.01, 0.02}});
+    std::string zUp;
+    for (const auto& [name, value] : {std::pair{"UpAxis", 2},
+                                      {"UpAxisSign", 1},
+                                      {"FrontAxis", 1},
+                                      {"FrontAxisSign", -1},
+                                      {"CoordAxis", 0},
+                                      {"CoordAxisSign", 1}})
+        zUp += fmt::format("\t\tP: \"{}\", \"int\", \"Integer\", \"\",{}\n", name, value);
+    expectCornersAt(with(unitOf(1), zUp),
+                    {glm::dvec3(0, 0.02, 0), {0.01, 0.02, 0}, {0, 0.02, -0.01}});
 }
 
 TEST(Fbx, TheUpAxisIsUp) {

@@ -418,6 +418,12 @@ TEST(Gltf, TransmissionAndMorphedColoursAreSaidToBeDropped) {
     gltf.root["extensionsRequired"] = {"KHR_materials_transmission"};
     EXPECT_TRUE(readGoodText(gltf.text(), "a.gltf").notes.empty());
     glass["transmissionFactor"] = 0.5;
+    const auto error = readBadText(gltf.text(), "a.gltf");
+    EXPECT_EQ(error.code, ErrorCode::unsupported);
+    EXPECT_EQ(error.message,
+              "materials[0] needs the glTF extension KHR_materials_transmission, which the file "
+              "requires and which is not drawn here; export it without");
+    gltf.root.erase("extensionsRequired");
     const int accessor = gltf.primitive()["attributes"]["POSITION"];
     gltf.primitive()["targets"] = {{{"COLOR_0", accessor}, {"TEXCOORD_0", accessor}},
                                    {{"TEXCOORD_1", accessor}}};

@@ -140,8 +140,7 @@ void expectTruth(const SplatCloud& cloud, const Camera& camera) {
     std::size_t depths = 0, wrong = 0;
     for (int y = 0; y < camera.height; ++y) {
         for (int x = 0; x < camera.width; ++x) {
-            glm::dvec4 t = truth.colour.at(x, y);
-            t = glm::dvec4(glm::min(glm::dvec3(t), t.w), t.w);  // no channel above 1
+            const glm::dvec4 t = truth.colour.at(x, y);
             const glm::dvec4 off = t - glm::dvec4(drawn->colour.at(x, y));
             squares += glm::dot(off, off) / 4;
             const double depth = truth.depth.at(x, y);
@@ -227,6 +226,23 @@ TEST(DrawSplats, LinearColoursAreBlendedAsLight) {
     const auto drawn = drawSplats(cloud, cameraFrom({0, 0, 3}, 21, 21), false, job);
     const glm::vec4 middle = drawn->colour.at(10, 10);
     EXPECT_NEAR(middle.x / middle.w, srgbFromLinear(0.2f), 1e-4f);
+}
+
+TEST(DrawSplats, BrighterThanWhiteIsClippedOnlyWhereThePictureCannotHoldIt) {
+    Mesh mesh;
+    auto cloud = disc({0, 0, 1});
+    cloud.colours[0] = glm::vec3(1.5f, 0.5f, 0);
+    mesh.splats = std::make_shared<const SplatCloud>(cloud);
+    for (const bool beyondOne : {true, false}) {
+        RasterSettings settings;
+        settings.lighting.beyondOne = beyondOne;
+        Job job;
+        const auto image = rasterise(mesh, cameraFrom({0, 0, 3}, 21, 21), settings, job);
+        ASSERT_TRUE(image);
+        const glm::vec4 middle = image->colour.at(10, 10);
+        EXPECT_NEAR(middle.x / middle.w, beyondOne ? 1.5f : 1.0f, 1e-5f);
+        EXPECT_NEAR(middle.y / middle.w, 0.5f, 1e-5f);
+    }
 }
 
 TEST(DrawSplats, WhatIsBehindOrAroundTheCameraIsNotDrawn) {
