@@ -578,10 +578,6 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
     return out;
 }
 
-}  // namespace
-
-namespace {
-
 /// What is brighter than white becomes white, under its coverage.
 void clip(Image<glm::vec4>& colour) {
     parallelFor(0, colour.height(), 16, [&](int y) {
