@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <vector>
 
 #include "formats/files/files.hpp"
 #include "formats/files/no_case.hpp"
@@ -170,8 +171,13 @@ Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job) {
     auto document = *container == Mpeg4Container::bt ? readBt(textOf(whole), path.string(), job)
                                                      : readXmt(textOf(whole), path.string(), job);
     if (!document) return document;
-    STX_TRY(const auto real, throughLinks(path));
-    STX_CHECK(within(where, loadMedia(*document, {folderOf(path), folderOf(real)}, job)));
+    std::vector<std::filesystem::path> folders = {folderOf(path)};
+    // Standard input has no folder, whatever it is a link to.
+    if (folders.front() != "/dev") {
+        STX_TRY(const auto real, throughLinks(path));
+        folders.push_back(folderOf(real));
+    }
+    STX_CHECK(within(where, loadMedia(*document, folders, job)));
     return document;
 }
 

@@ -87,7 +87,7 @@ class SamePictures(Case):
     def test_lit_colours_above_one(self):
         bundle = stx.convert(MODEL, views="ring:4", size=(64, 64))
         bundle.save("a.exr")
-        lights = [stx.Light("directional", (-1, -1, -0.5), 9)]
+        lights = [stx.Light("directional", (-1, -1, -0.5), colour=9)]
         for mode in ("splat", "surface"):
             run("render", "a.exr", "-o", "p.exr", "--orbit", 1, "--size", "48x48", "--mode", mode, "--light", "dir:-1,-1,-0.5,9,9,9")
             camera = stx.orbit(bundle, 1, size=(48, 48))[0]
