@@ -52,7 +52,7 @@ struct TiffLayout {
 /// What an entry of a directory says.
 struct TiffEntry {
     std::uint64_t count = 0;   ///< of values
-    std::uint64_t number = 0;  ///< the value, of SHORT, else as wide as an offset, which it may be
+    std::uint64_t number = 0;  ///< the value, of one SHORT or LONG; else where values are
 };
 
 /// The entry of that tag in the directory at that byte.
@@ -60,15 +60,19 @@ struct TiffEntry {
                                                             const TiffLayout& layout,
                                                             std::uint64_t directory,
                                                             std::uint64_t tag) {
-    constexpr std::uint64_t kShort = 3;
+    constexpr std::uint64_t kShort = 3, kLong = 4;
     if (directory >= file.size()) return {};
     const std::uint64_t count = file.at(directory, layout.count);
     for (std::uint64_t i = 0; i < count && i < file.size() / layout.entry; ++i) {
         const std::uint64_t entry = directory + layout.count + i * layout.entry;
         if (file.at(entry, 2) != tag) continue;
-        const std::size_t bytes = file.at(entry + 2, 2) == kShort ? 2 : layout.offset;
-        return TiffEntry{file.at(entry + 4, layout.offset),
-                         file.at(entry + layout.valueAt(), bytes)};
+        const std::uint64_t type = file.at(entry + 2, 2);
+        const std::uint64_t values = file.at(entry + 4, layout.offset);
+        const std::size_t bytes = values != 1      ? layout.offset
+                                  : type == kShort ? 2
+                                  : type == kLong  ? 4
+                                                   : layout.offset;
+        return TiffEntry{values, file.at(entry + layout.valueAt(), bytes)};
     }
     return {};
 }

@@ -190,6 +190,29 @@ TEST(PanoramaFiles, TagsOfATiffItselfTellThemToo) {
     EXPECT_TRUE(readExif(jpegWithExif(true, 1, 28)).oriented);
 }
 
+TEST(PanoramaFiles, BigTiffTellsItsSizeAndOrientation) {
+    std::string tiff("MM\0\x2b\0\x08\0\0", 8);
+    const auto number = [&](std::uint64_t value, int size) {
+        for (int i = size - 1; i >= 0; --i) tiff += static_cast<char>(value >> 8 * i & 255);
+    };
+    number(16, 8);
+    number(3, 8);
+    for (const auto& [tag, type, value] :
+         {std::tuple{256, 4, 70000}, std::tuple{257, 3, 12}, std::tuple{274, 3, 8}}) {
+        number(static_cast<unsigned>(tag), 2);
+        number(static_cast<unsigned>(type), 2);
+        number(1, 8);
+        // To the left in its field.
+        const int size = type == 3 ? 2 : 4;
+        number(static_cast<unsigned>(value), size);
+        number(0, 8 - size);
+    }
+    number(0, 8);
+    EXPECT_EQ(storedSizeOfTiff(bytesOf(tiff)), glm::ivec2(70000, 12));
+    EXPECT_EQ(readExif(bytesOf(tiff)).orientation, 8);
+    EXPECT_EQ(storedSizeOfTiff(jpegWithExif(true, 6, 28)), glm::ivec2(0));
+}
+
 TEST(PanoramaFiles, PicturesAreTurnedUpright) {
     // Upright it is a b c / d e f; where its first pixel is, for each orientation (EXIF 2.3).
     Rgba8Image upright(3, 2);
