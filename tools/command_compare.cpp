@@ -191,8 +191,11 @@ Result<std::optional<Image<std::uint8_t>>> openMask(const CompareOptions& o, Pro
     if (o.mask.empty()) return std::nullopt;
     STX_TRY(const auto loaded, openPicture(o.mask, program.job));
     if (loaded.isLinear())
-        return fail(ErrorCode::usage, "--mask '{}' must be an 8-bit image", o.mask);
-    return maskFrom(loaded.coded);
+        return fail(ErrorCode::usage, "--mask '{}' must be an image of 8 or 16 bits", o.mask);
+    std::string note;
+    auto mask = loaded.fine.empty() ? maskFrom(loaded.coded, note) : maskFrom(loaded.fine, note);
+    if (!note.empty()) program.job.note(note);
+    return mask;
 }
 
 /// All pairs of two folders or two sequences.

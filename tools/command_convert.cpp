@@ -242,6 +242,8 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
         if (passed) {
             noteUnused(input, Reads::moment, o, program);
             done = summaryOf(*passed, countPoints);
+            if (done->views == 0)
+                program.job.note("the scene shows no view with images; it is written as it is");
         }
     }
     if (!done) STX_SET(done, convertSequence(input, target, o, countPoints, program));

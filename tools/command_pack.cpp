@@ -323,6 +323,10 @@ void addObjectsOf(const Atlas& atlas, nlohmann::ordered_json& report) {
              {"pixels", {{"source", object.sourcePixels}, {"kept", object.keptPixels}}}});
 }
 
+/// Of --period where a film is packed by --time.
+constexpr const char* kOfAtlases = "of an atlas for each frame";
+constexpr const char* kOneMoment = "--time takes one moment";
+
 /// Several inputs into one atlas, each an object with a name.
 Result<int> packSheet(const PackOptions& o, const Command& command, Program& program) {
     const Stopwatch watch;
@@ -348,6 +352,8 @@ Result<int> packSheet(const PackOptions& o, const Command& command, Program& pro
     }
     if (std::ranges::none_of(frames, [](const auto& f) { return f->timeline().moves(); }))
         program.job.noteUnused(command.given({"--time", "--period"}), "of films", "nothing moves");
+    else
+        program.job.noteUnused(command.given({"--period"}), kOfAtlases, kOneMoment);
     STX_TRY(auto joined, joinTables(std::move(objects), program.job));
     PackSettings settings = o.settings;
     settings.objects = &joined.objects;
@@ -397,6 +403,8 @@ Result<int> packInput(const PackOptions& options, const Command& command, Progra
     if (!timeline.moves())
         program.job.noteUnused(command.given({"--period"}), "of films",
                                fmt::format("'{}' does not move", o.input));
+    else if (o.time)
+        program.job.noteUnused(command.given({"--period"}), kOfAtlases, kOneMoment);
     if (o.time || !numbered) {
         if (!o.time && timeline.moves())
             return fail(ErrorCode::usage,

@@ -369,7 +369,9 @@ Result<void> describeSet(const fs::path& path, Json& out, Job& job) {
         if (!view.depth.empty()) j["depth"] = view.depth;
         if (!view.missing.empty()) j["missing"] = view.missing;
         missing += static_cast<int>(view.missing.size());
-        if (set.camerasKnown) {
+        if (view.lost) {
+            j["lost"] = true;
+        } else if (set.camerasKnown) {
             const auto turn = axisAngleFromQuat(c.orientation);
             j["position"] = vectorJson(c.position);
             j["orientation"] = {turn.x, turn.y, turn.z, turn.w};
@@ -472,7 +474,8 @@ Result<void> addMeasured(const fs::path& path, FileKind kind, const InfoOptions&
             if (kind == FileKind::imageSet) return memoryOfSet(path, frames, job);
             if (!onDemand) return memoryOfSizes(out["views"], frames, false, job.limits);
             STX_TRY(const auto table, openViews(path, open, job));
-            return memoryJson(*table, frames, job);
+            const bool keeps = kind == FileKind::mpeg4 && frames > 1;
+            return memoryJson(*table, frames, keeps ? mpeg4::keptPictureBytes(job.limits) : 0, job);
         };
         STX_TRY(out["memory"], within(fmt::format("'{}'", path.string()), memory()));
     }

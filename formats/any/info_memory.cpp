@@ -157,7 +157,7 @@ class MemoryOfCommands {
 };
 
 nlohmann::ordered_json memoryOf(const ViewTable& table, std::size_t frames, bool refines,
-                                const Limits& limits) {
+                                const Limits& limits, std::uint64_t kept = 0) {
     const bool vectors = std::ranges::any_of(
         table.kinds(), [](const ViewImageKinds& k) { return k.normal || k.splatU || k.splatV; });
     const MemoryOfCommands memory(table, frames, refines, limits);
@@ -165,7 +165,7 @@ nlohmann::ordered_json memoryOf(const ViewTable& table, std::size_t frames, bool
     for (const ViewCommand& command : kCommands) {
         const auto takes = memory.of(command, vectors ? *command.takesWithVectors : *command.takes);
         commands.push_back({{"command", command.words},
-                            {"bytes", takes.bytes},
+                            {"bytes", takes.bytes + kept},
                             {"views", takes.all                   ? "all"
                                       : command.looks == atGroups ? "as many as fit"
                                                                   : "one for each thread"}});
@@ -187,9 +187,12 @@ class SizesAlone : public ViewTable {
 
 }  // namespace
 
-Result<nlohmann::ordered_json> memoryJson(const ViewTable& table, std::size_t frames, Job& job) {
+Result<nlohmann::ordered_json> memoryJson(const ViewTable& table, std::size_t frames,
+                                          std::uint64_t mostKept, Job& job) {
     STX_TRY(const bool refines, mayRefine(table, RefineSettings(), job));
-    return memoryOf(table, frames, refines, job.limits);
+    std::uint64_t decoded = 0;
+    for (std::size_t i = 0; i < table.count(); ++i) decoded += table.bytesOf(i) * frames;
+    return memoryOf(table, frames, refines, job.limits, std::min(decoded, mostKept));
 }
 
 Result<nlohmann::ordered_json> memoryOfSizes(const nlohmann::ordered_json& views,

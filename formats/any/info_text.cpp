@@ -73,6 +73,7 @@ std::string setViewText(std::size_t number, const Json& v) {
     if (v.contains("depth")) out += fmt::format(", depth {}", shown(v["depth"]));
     if (v.contains("missing"))
         for (const auto& name : v["missing"]) out += fmt::format(", {} is missing", shown(name));
+    if (v.contains("lost")) out += ", without a camera: tracking was lost";
     return out + "\n";
 }
 

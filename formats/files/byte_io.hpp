@@ -16,6 +16,12 @@ inline std::uint32_t bigEndian(ByteSpan bytes, std::size_t at, std::size_t count
     return value;
 }
 
+/// Whether that text is at a place, which may be past the end.
+inline bool hasText(ByteSpan bytes, std::size_t at, std::string_view text) {
+    if (at > bytes.size() || bytes.size() - at < text.size()) return false;
+    return std::string_view(reinterpret_cast<const char*>(bytes.data()) + at, text.size()) == text;
+}
+
 /// Reads big-endian numbers. Past the end it gives zeros and remembers that it failed.
 class ByteReader {
   public:

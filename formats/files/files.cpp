@@ -106,7 +106,8 @@ tl::unexpected<Error> failExists(const fs::path& target) {
                 target.string());
 }
 
-/// What a target's name stands for; a link is written through, not replaced.
+}  // namespace
+
 Result<fs::path> throughLinks(const fs::path& target) {
     // Step by step: weakly_canonical() leaves a link to what does not exist yet as it is.
     constexpr int kMostLinks = 40;  // as the system
@@ -120,8 +121,6 @@ Result<fs::path> throughLinks(const fs::path& target) {
     }
     return real;
 }
-
-}  // namespace
 
 fs::path shownName(const fs::path& path) {
     const std::lock_guard lock(targets().mutex);

@@ -80,6 +80,10 @@ class OutputFolder {
     std::unique_ptr<Impl> impl_;
 };
 
+/// The file that a name leads to, there or not: outputs are written through links, which stay.
+/// Error (io): links in a circle.
+[[nodiscard]] Result<std::filesystem::path> throughLinks(const std::filesystem::path& path);
+
 /// The folder that a file lies in; "." for a bare name.
 [[nodiscard]] std::filesystem::path folderOf(const std::filesystem::path& path);
 

@@ -159,21 +159,48 @@ Image<glm::vec4> rgbaFloatFrom(const DecodedImage& image) {
     return out;
 }
 
-Image<std::uint8_t> maskFrom(const Image<glm::u8vec4>& picture) {
+namespace {
+
+/// maskFrom() of pixels whose largest code is `largest`; codeOf() gives the codes of one.
+template <class P, class CodeOf>
+Image<std::uint8_t> maskOf(const Image<P>& picture, std::uint32_t largest, std::string& note,
+                           CodeOf codeOf) {
     Image<std::uint8_t> mask(picture.width(), picture.height());
-    int low = 255, high = 0;
-    for (std::size_t i = 0; i < mask.count(); ++i) {
-        const glm::u8vec4 p = picture.data()[i];
+    std::uint32_t low = largest, high = 0;
+    const auto shareOf = [&](std::size_t i) {
+        const glm::uvec4 p = codeOf(picture.data()[i]);
         // Luma of BT.709 in ten-thousandths, which gives greys back exactly.
-        const int luma = (2126 * p.r + 7152 * p.g + 722 * p.b + 5000) / 10000;
-        const int share = (luma * p.a + 127) / 255;
-        mask.data()[i] = static_cast<std::uint8_t>(share);
+        const std::uint32_t luma = (2126 * p.r + 7152 * p.g + 722 * p.b + 5000) / 10000;
+        return static_cast<std::uint32_t>((std::uint64_t{luma} * p.a + largest / 2) / largest);
+    };
+    for (std::size_t i = 0; i < mask.count(); ++i) {
+        const std::uint32_t share = shareOf(i);
         if (share > 0) low = std::min(low, share);
         high = std::max(high, share);
     }
-    if (low == high)
-        for (auto& share : mask.pixels()) share = share > 0 ? 255 : 0;
+    const bool oneValue = low == high;
+    for (std::size_t i = 0; i < mask.count(); ++i) {
+        const std::uint32_t share = oneValue && shareOf(i) > 0 ? largest : shareOf(i);
+        mask.data()[i] =
+            static_cast<std::uint8_t>((share * std::uint64_t{255} + largest / 2) / largest);
+    }
+    if (oneValue && high < largest)
+        note = fmt::format("the one value of the mask beside 0, {} of {}, is taken for inside",
+                           high, largest);
     return mask;
+}
+
+}  // namespace
+
+Image<std::uint8_t> maskFrom(const Image<glm::u8vec4>& picture, std::string& note) {
+    return maskOf(picture, 255, note, [](glm::u8vec4 p) { return glm::uvec4(p); });
+}
+
+Image<std::uint8_t> maskFrom(const Image<glm::vec4>& picture, std::string& note) {
+    static constexpr float kLargest = 65535;
+    return maskOf(picture, 65535, note, [](glm::vec4 p) {
+        return glm::uvec4(glm::clamp(p, 0.0f, 1.0f) * kLargest + 0.5f);
+    });
 }
 
 }  // namespace stx

@@ -2,13 +2,14 @@
 
 #include <libexif/exif-data.h>
 
-#include <cstring>
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <string_view>
 
 #include "formats/files/byte_io.hpp"
 #include "formats/images/images.hpp"
+#include "formats/images/tiff_numbers.hpp"
 
 namespace stx {
 namespace {
@@ -38,18 +39,26 @@ ExifNotes notesOf(ByteSpan exif) {
     exif_data_unset_option(data.get(), EXIF_DATA_OPTION_FOLLOW_SPECIFICATION);
     exif_data_load_data(data.get(), reinterpret_cast<const unsigned char*>(exif.data()),
                         static_cast<unsigned>(exif.size()));
-    if (const auto o = numberOf(data.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION); o >= 1 && o <= 8) {
-        notes.orientation = static_cast<int>(o);
-        notes.oriented = true;
-    }
-    const auto focal = numberOf(data.get(), EXIF_IFD_EXIF, EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
-    if (focal < 10000) notes.focal35 = focal;
+    notes.setOrientation(numberOf(data.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION));
+    notes.setFocal35(numberOf(data.get(), EXIF_IFD_EXIF, EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM));
     return notes;
 }
 
-bool hasText(ByteSpan bytes, std::size_t at, std::string_view text) {
-    return bytes.size() >= at + text.size() &&
-           std::memcmp(bytes.data() + at, text.data(), text.size()) == 0;
+/// Of a picture that is a TIFF itself.
+ExifNotes notesOfTiff(ByteSpan file, const TiffLayout& layout) {
+    const TiffNumbers numbers(file);
+    const auto numberOf = [&](std::uint64_t directory, ExifTag tag) {
+        const auto entry = findTiffEntry(numbers, layout, directory, tag);
+        return entry ? entry->number : 0;
+    };
+    const std::uint64_t first = numbers.at(layout.start, layout.offset);
+    ExifNotes notes;
+    notes.setOrientation(numberOf(first, EXIF_TAG_ORIENTATION));
+    // Programs write 1 without looking; it is what a TIFF without the tag means, too.
+    notes.oriented = notes.orientation != 1;
+    if (const std::uint64_t exif = numberOf(first, EXIF_TAG_EXIF_IFD_POINTER); exif != 0)
+        notes.setFocal35(numberOf(exif, EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM));
+    return notes;
 }
 
 /// The TIFF of a JPEG's segment APP1 or of a PNG's chunk eXIf; else empty.
@@ -82,7 +91,21 @@ ByteSpan exifIn(ByteSpan file) {
 }  // namespace
 
 ExifNotes readExif(ByteSpan file) {
+    // Pixels come first in many: libexif reads the first 64 KiB.
+    if (const TiffLayout* layout = tiffLayoutOf(file)) return notesOfTiff(file, *layout);
     return readExifTiff(exifIn(file));
+}
+
+glm::ivec2 storedSizeOfTiff(ByteSpan file) {
+    constexpr std::uint64_t kWidth = 256, kHeight = 257;
+    const TiffLayout* const layout = tiffLayoutOf(file);
+    if (!layout) return {0, 0};
+    const TiffNumbers numbers(file);
+    const std::uint64_t first = numbers.at(layout->start, layout->offset);
+    const auto width = findTiffEntry(numbers, *layout, first, kWidth);
+    const auto height = findTiffEntry(numbers, *layout, first, kHeight);
+    if (!width || !height || std::max(width->number, height->number) > INT32_MAX) return {0, 0};
+    return {static_cast<int>(width->number), static_cast<int>(height->number)};
 }
 
 ExifNotes readExifTiff(ByteSpan tiff) {
@@ -91,12 +114,6 @@ ExifNotes readExifTiff(ByteSpan tiff) {
     Bytes exif(header.begin(), header.end());
     exif.insert(exif.end(), tiff.begin(), tiff.end());
     return notesOf(exif);
-}
-
-Result<Image<glm::u8vec4>> decodeUpright(ByteSpan bytes, std::string_view name,
-                                         const Limits& limits, Rgba8Loss* loss) {
-    STX_TRY(auto stored, decodeRgba8(bytes, name, limits, loss));
-    return turnedUpright(std::move(stored), readExif(bytes).orientation);
 }
 
 }  // namespace stx

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "formats/files/files.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/image.hpp"
@@ -13,12 +15,26 @@ struct ExifNotes {
     int orientation = 1;
     bool oriented = false;  ///< the file has that tag
     double focal35 = 0;  ///< focal length of a 36x24 mm camera with the same diagonal, mm; 0 = none
+
+    /// Of what the tags say; what they cannot say changes nothing.
+    void setOrientation(std::uint64_t said) {
+        if (said < 1 || said > 8) return;
+        orientation = static_cast<int>(said);
+        oriented = true;
+    }
+    void setFocal35(std::uint64_t said) {
+        if (said < 10000) focal35 = static_cast<double>(said);
+    }
 };
 
-/// EXIF of a JPEG (APP1) or a PNG (eXIf); the defaults where there is none, or a damaged one.
+/// EXIF of a JPEG (APP1), a PNG (eXIf) or a TIFF (its own tags, of which orientation 1 counts as
+/// not there); the defaults where there is none, or a damaged one.
 [[nodiscard]] ExifNotes readExif(ByteSpan file);
 /// The same of the TIFF alone that such a segment holds.
 [[nodiscard]] ExifNotes readExifTiff(ByteSpan tiff);
+
+/// Columns and rows of a TIFF's first picture as it is stored; 0 of other files.
+[[nodiscard]] glm::ivec2 storedSizeOfTiff(ByteSpan file);
 
 /// The picture turned as its EXIF orientation says.
 template <class T>
@@ -38,10 +54,5 @@ template <class T>
         }
     return out;
 }
-
-/// decodeRgba8(), turned as the picture's EXIF says: as viewers show it.
-[[nodiscard]] Result<Image<glm::u8vec4>> decodeUpright(ByteSpan bytes, std::string_view name,
-                                                       const Limits& limits,
-                                                       Rgba8Loss* loss = nullptr);
 
 }  // namespace stx

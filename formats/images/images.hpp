@@ -45,6 +45,7 @@ struct DecodedImage {
     /// to be so, by toRec709() of those who take the picture for colours.
     std::optional<glm::dmat3> rec709FromRgb;
     std::string primariesNote;   ///< what is done about such primaries
+    std::string colourNote;      ///< of colours of video that are not converted, for a person
     bool premultiplied = false;  ///< there is alpha, and colours hold it (EXR, TIFF)
     /// Where the stored pixels (EXR: the data window) lie in the picture (the display window), and
     /// the size of that; other formats: 0, 0 and the image's own size.
@@ -116,8 +117,11 @@ class SharedRgba8Loss {
 
 /// A picture as a mask: how far each pixel belongs to what it shows, 0..255, which is its luma
 /// times its alpha. Where there is one value beside 0, that is 255: COLMAP and nerfstudio keep what
-/// is not 0, and masks of theirs have 1, 255 or the number of a class.
-[[nodiscard]] Image<std::uint8_t> maskFrom(const Image<glm::u8vec4>& picture);
+/// is not 0, and masks of theirs have 1, 255 or the number of a class. `note`: says so where that
+/// value is not the largest; else it stays.
+[[nodiscard]] Image<std::uint8_t> maskFrom(const Image<glm::u8vec4>& picture, std::string& note);
+/// The same of 16-bit codes from 0 to 1, as rgbaFloatFrom() gives them.
+[[nodiscard]] Image<std::uint8_t> maskFrom(const Image<glm::vec4>& picture, std::string& note);
 
 /// PNG bytes of 1..4 channels with 8 or 16 bits (values in host order), tagged sRGB when `srgb`.
 /// The same input gives the same bytes. `level` is 0 (fast, large) to 9; from 2 on the filter of

@@ -66,8 +66,12 @@ Result<void> applyMask(const SetView& set, const std::filesystem::path& file, St
                        Job& job) {
     const std::string name = file.string(), where = fmt::format("'{}'", name);
     STX_TRY(const auto bytes, readFile(file, job.limits));
-    STX_TRY(const auto picture, decodeRgba8(bytes, name, job.limits));
-    const Image<std::uint8_t> mask = maskFrom(picture);
+    STX_TRY(const auto picture, decodeImage(bytes, name, job.limits));
+    std::string note;
+    const Image<std::uint8_t> mask = picture.bits() == 16 ? maskFrom(rgbaFloatFrom(picture), note)
+                                                          : maskFrom(rgba8From(picture), note);
+    // Once for all masks of a set, and in films where the notes of later frames are dropped.
+    if (!note.empty()) job.noteOnce(note);
     if (mask.width() != stored.texture.width() || mask.height() != stored.texture.height())
         return failAt(where, ErrorCode::invalidInput,
                       "the mask is {}x{}, but its picture '{}' has {}x{} pixels; both must match",

@@ -389,6 +389,10 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
         return failAt(where, ErrorCode::invalidInput,
                       "no camera has both a texture and a depth image beside the file (such as "
                       "NAME_color.png and NAME_depth16.png, or NAME_texture_WxH_FORMAT.yuv)");
+    if (options.yuv != YuvColour() &&
+        std::ranges::none_of(set.views, [](const SetView& v) { return v.texture.yuv.has_value(); }))
+        job.noteUnused({"--yuv"}, "of MIV sets with .yuv files",
+                       fmt::format("the pictures of {} are of other kinds", where));
     set.frames = std::max(frames, 1);
     STX_TRY(const auto rate, within(where, findNumber(json, "Fps", "")));
     if (rate && !(*rate > 0))

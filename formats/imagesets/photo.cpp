@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
+#include <optional>
+#include <utility>
 
 #include "formats/files/messages.hpp"
 #include "formats/files/not_there.hpp"
@@ -152,13 +155,13 @@ Result<void> findTurn(const Photo& photo, glm::ivec2 size, PhotoDepth& depth, Jo
     return {};
 }
 
-/// Depth beside the photo, with its code.
+/// Depth beside the photo, with its code. `read` becomes its values.
 Result<PhotoDepth> besideDepth(const path& file, const ImageSetOptions& options, Photo& photo,
-                               Job& job) {
+                               std::optional<StoredDepth>& read, Job& job) {
     PhotoDepth depth;
     depth.source.path = file;
     depth.source.name = file.filename().string();
-    STX_TRY(const auto stored, readBeside(depth.source, job));
+    STX_TRY(auto stored, readBeside(depth.source, job));
     STX_CHECK(findTurn(photo, stored.values.size(), depth, job));
     glm::ivec2 size = stored.values.size();
     // The photo's own turn is counted on its pictures' sizes.
@@ -172,27 +175,29 @@ Result<PhotoDepth> besideDepth(const path& file, const ImageSetOptions& options,
                    : depth.unit > 0        ? "distance in steps"
                    : depth.code.zeroIsNear ? "black is near"
                                            : "white is near";
+    stored.values = turnedUpright(std::move(stored.values), depth.orientation);
+    read = std::move(stored);
     return depth;
 }
 
 /// Gives a range to a code without one, or the one that is asked for: of the ends of a code with a
-/// scale, as its file has them, else of the values that the picture has.
+/// scale, as its file has them, else of the values that the picture has: those in `read`, or it
+/// becomes them.
 Result<void> setRange(const Photo& photo, const ImageSetOptions& options, PhotoDepth& depth,
-                      Job& job) {
+                      std::optional<StoredDepth>& read, Job& job) {
     const bool given = options.depthMin > 0;
     if (depth.code.scaled()) {
         if (given) depth.code.setRange(options.depthMin, options.depthMax);
         return {};
     }
     if (depth.unit > 0) return {};
-    STX_TRY(const auto stored, storedDepth(photo, depth, job));
-    if (stored.bits == 32) return {};
-    const int largest = (1 << stored.bits) - 1;
+    if (!read) STX_SET(read, storedDepth(photo, depth, job));
+    if (read->bits == 32) return {};
+    const int largest = (1 << read->bits) - 1;
     if (given)
-        depth.code.setRange(options.depthMin, options.depthMax, stored.values, largest,
-                            stored.lossy);
+        depth.code.setRange(options.depthMin, options.depthMax, read->values, largest, read->lossy);
     else
-        depth.code.assumeRange(stored.values, largest, stored.lossy);
+        depth.code.assumeRange(read->values, largest, read->lossy);
     depth.assumed = !given;
     return {};
 }
@@ -273,13 +278,29 @@ void noteDepth(const Photo& photo, const PhotoDepth& depth, const ImageSetOption
         notes.emplace_back("the picture with the blurred background is used, as --colour-of says");
 }
 
-Result<StoredView> loadPhoto(const Photo& photo, const PhotoDepth& depth, bool wantsMatte,
-                             const std::vector<std::string>& notes, Job& job) {
+/// Depth that was read for its code, for the first who loads the view: decoding takes as long as
+/// much of the rest.
+class KeptDepth {
+  public:
+    explicit KeptDepth(std::optional<StoredDepth> depth) : depth_(std::move(depth)) {}
+    [[nodiscard]] std::optional<StoredDepth> take() {
+        const std::lock_guard lock(mutex_);
+        return std::exchange(depth_, std::nullopt);
+    }
+
+  private:
+    std::mutex mutex_;
+    std::optional<StoredDepth> depth_;
+};
+
+Result<StoredView> loadPhoto(const Photo& photo, const PhotoDepth& depth, KeptDepth& kept,
+                             bool wantsMatte, const std::vector<std::string>& notes, Job& job) {
     for (const std::string& note : notes) job.note(note);
     StoredView stored;
-    STX_TRY(auto values, storedDepth(photo, depth, job));
-    stored.depth = std::move(values.values);
-    stored.depthBits = values.bits;
+    auto values = kept.take();
+    if (!values) STX_SET(values, storedDepth(photo, depth, job));
+    stored.depth = std::move(values->values);
+    stored.depthBits = values->bits;
     std::string profile;
     STX_TRY(auto picture, photos::decodeColour(photo, profile, job));
     if (!profile.empty()) job.note(profile);
@@ -334,6 +355,7 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
 
     PhotoDepth depth;
     depth.code = photo->code;
+    std::optional<StoredDepth> read;
     SetView view;
     view.name = "photo";
     view.texture.path = given;
@@ -341,7 +363,7 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
     view.depth.name = view.texture.name;
     if (!beside.empty()) {
         photo->format = "picture and depth";
-        STX_TRY(depth, besideDepth(beside, options, *photo, job));
+        STX_TRY(depth, besideDepth(beside, options, *photo, read, job));
         view.depth = depth.source;
     } else if (options.depthUnit > 0 || options.photo.nearIs != NearIs::unknown) {
         return failAt(where, ErrorCode::usage,
@@ -349,7 +371,7 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
                       "beside a photo",
                       options.depthUnit > 0 ? "--depth-unit" : "--depth-near");
     }
-    STX_CHECK(within(where, setRange(*photo, options, depth, job)));
+    STX_CHECK(within(where, setRange(*photo, options, depth, read, job)));
     photo->code = depth.code;
 
     glm::ivec2 size = photo->uprightSize(photo->colour);
@@ -366,8 +388,9 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
     noteDepth(*photo, depth, options, notes);
     view.stretched = beside.empty();
     const bool raises = options.refine.atImport(RefineStep::raise, true);
-    view.load = [photo, depth, raises, notes](const SetView&, Job& own) {
-        return loadPhoto(*photo, depth, raises, notes, own);
+    const auto kept = std::make_shared<KeptDepth>(std::move(read));
+    view.load = [photo, depth, kept, raises, notes](const SetView&, Job& own) {
+        return loadPhoto(*photo, depth, *kept, raises, notes, own);
     };
     view.distances = [code = depth.code, unit = depth.unit](Image<float>& values,
                                                             const Camera& camera, int bits,

@@ -7,6 +7,7 @@
 
 #include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
+#include "formats/images/more_pictures.hpp"
 #include "formats/imagesets/text_lines.hpp"
 #include "formats/photos/file_colours.hpp"
 #include "formats/video/film.hpp"
@@ -39,6 +40,7 @@ void placeInDisplay(DecodedImage& image) {
 }
 
 Result<DecodedImage> decode(const PictureSource& source, ByteSpan bytes, Job& job) {
+    noteMorePictures(bytes, source.name, job);
     auto image = decodeImage(bytes, source.name, job.limits);
     if (image) {
         const auto pixels = static_cast<std::uint64_t>(std::max(0, image->displayWidth)) *
@@ -185,7 +187,7 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         STX_TRY(const auto picture, source.film->picture(source.frame));
         if (picture.bits() > 8) noteRounding(picture.bits(), "", job);
         if (const std::string note = picture.notConverted(); !note.empty())
-            job.note(inQuotes(source.name) + ": " + note);
+            job.note(inQuotes(source.name) + ": " + note + VideoPicture::kConvertFirst);
         STX_TRY(auto image, within(inQuotes(source.name), picture.colour(job.limits)));
         out.alpha = picture.hasAlpha();
         out.texture = std::move(image);

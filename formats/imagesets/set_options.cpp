@@ -61,7 +61,7 @@ const std::vector<SetOption>& setOptions() {
          {"middlebury"},
          "Middlebury sets without calib.txt"},
         {"--yuv",
-         [](const O& o) { return o.yuv.matrix != YuvMatrix::bt709 || o.yuv.fullRange; },
+         [](const O& o) { return o.yuv != YuvColour(); },
          {"miv"},
          "MIV sets with .yuv files"},
         {"--depth-near",

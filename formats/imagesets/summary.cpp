@@ -50,6 +50,7 @@ Result<ImageSetSummary> summariseImageSet(const std::filesystem::path& path, Job
         ImageSetSummary::View out;
         out.name = view.name;
         out.camera = view.camera;
+        out.lost = view.lost;
         out.panorama = view.panorama.has_value();
         out.video = view.texture.film || view.depth.film;
         out.later = motion.moves() && !first.contains(summary.views.size());

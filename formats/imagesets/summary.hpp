@@ -27,6 +27,7 @@ struct ImageSetSummary {
         std::string colour;     ///< names as the set has them; empty where one file holds all
         std::string depth;
         std::vector<std::string> missing;  ///< those of the two that are not there
+        bool lost = false;                 ///< tracking was, so that the camera has no meaning
     };
     std::string kind;  ///< one of imageSetKinds()
     std::string title;

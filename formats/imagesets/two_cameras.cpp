@@ -27,6 +27,20 @@ Result<void> readMotion(const std::string& file, DepthCamera& depth, Job& job) {
     return {};
 }
 
+/// Errors (usage) for intrinsics that no camera has: floats of what they make overflow.
+Result<void> checkGiven(const char* option, const PixelIntrinsics& k) {
+    constexpr double kLeastFocal = 0.01, kMostPixels = 1e7;  // pixels; telescopes have some 1e6
+    const auto fits = [&](double f) {
+        return std::abs(f) >= kLeastFocal && std::abs(f) <= kMostPixels;
+    };
+    if (fits(k.x) && fits(k.y) && std::abs(k.z) <= kMostPixels && std::abs(k.w) <= kMostPixels)
+        return {};
+    return fail(ErrorCode::usage,
+                "{} is {:g},{:g},{:g},{:g}; focal lengths of {:g} to {:g} pixels and a principal "
+                "point within {:g} of 0 are expected",
+                option, k.x, k.y, k.z, k.w, kLeastFocal, kMostPixels, kMostPixels);
+}
+
 }  // namespace
 
 PixelIntrinsics scaledTo(glm::ivec2 size, PixelIntrinsics ofKinect) {
@@ -57,7 +71,9 @@ Result<std::optional<PixelIntrinsics>> givenIntrinsics(const ImageSetOptions& op
     if (k[1] == 0)
         return fail(ErrorCode::usage, "the focal lengths of --intrinsics are {:g} and {:g}", k[0],
                     k[1]);
-    return PixelIntrinsics(k[0], k[1], k[2], k[3]);
+    const PixelIntrinsics given(k[0], k[1], k[2], k[3]);
+    STX_CHECK(checkGiven("--intrinsics", given));
+    return given;
 }
 
 void noteOddCentre(const PixelIntrinsics& k, glm::ivec2 size, Job& job) {
@@ -96,6 +112,7 @@ Result<std::optional<DepthCamera>> depthCameraOf(const ImageSetOptions& options,
                               ? "two above 0 are"
                               : fmt::format("the signs of the colour camera's ({:g} and {:g}) are",
                                             depth.fx, depth.fy));
+        STX_CHECK(within(where, checkGiven("--depth-intrinsics", *k)));
         depth.fx = k->x;
         depth.fy = k->y;
         // These sets count from the first pixel's centre.

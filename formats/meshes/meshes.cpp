@@ -5,6 +5,7 @@
 
 #include "formats/files/deflate.hpp"
 #include "formats/images/images.hpp"
+#include "formats/images/more_pictures.hpp"
 #include "formats/meshes/readers.hpp"
 #include "formats/meshes/text_encoding.hpp"
 
@@ -104,6 +105,7 @@ Result<void> addTexture(Mesh& mesh, const std::filesystem::path& path, Job& job)
     STX_TRY(const auto bytes, readFile(path, job.limits));
     STX_TRY(auto pixels, within(fmt::format("'{}'", path.string()),
                                 decodeRgba8(bytes, path.filename().string(), job.limits)));
+    noteMorePictures(bytes, path.filename().string(), job);
     std::set<int> places;
     for (const auto& material : mesh.materials)
         if (material.baseColourTexture >= 0) places.insert(material.baseColourTexture);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "formats/images/images.hpp"
+#include "formats/images/more_pictures.hpp"
 
 namespace stx {
 
@@ -104,6 +105,7 @@ Result<int> ModelFiles::textureFromBytes(ByteSpan bytes, std::string_view name,
         first_.emplace(std::string(name), -1);
         return -1;
     }
+    noteMorePictures(bytes, name, job_);
     MeshTexture texture{std::move(*pixels), sampler.wrapU, sampler.wrapV, sampler.nearest};
     pixelBytes_ += texture.pixels.count() * sizeof(glm::u8vec4);
     if (pixelBytes_ > job_.limits.maxMemoryBytes)

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <span>
 
 #include "formats/files/no_case.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
@@ -112,8 +113,8 @@ constexpr std::size_t kMostOpen = 256;
 
 class MediaLoader {
   public:
-    MediaLoader(const std::filesystem::path& folder, bool many, Job& job)
-        : folder_(folder), many_(many), job_(job) {}
+    MediaLoader(std::span<const std::filesystem::path> folders, bool many, Job& job)
+        : folders_(folders), many_(many), job_(job) {}
 
     Result<void> load(ElementaryStream& stream, int odId) {
         if (stream.fileName.empty()) return {};
@@ -155,12 +156,12 @@ class MediaLoader {
     /// Where it is named, else beside the text: other programs write names as seen from where they
     /// ran, and files get moved together.
     Result<std::filesystem::path> find(const std::string& name) const {
-        auto path = resolveInside(folder_, name, job_.limits);
-        if (path) return path;
         const auto slash = name.find_last_of("/\\");
-        if (slash == std::string::npos) return path;
-        auto beside = resolveInside(folder_, name.substr(slash + 1), job_.limits);
-        return beside ? beside : path;
+        const std::string alone = slash == std::string::npos ? name : name.substr(slash + 1);
+        for (const auto& folder : folders_)
+            for (const std::string& form : {name, alone})
+                if (auto found = resolveInside(folder, form, job_.limits)) return found;
+        return resolveInside(folders_.front(), name, job_.limits);  // the error that it has
     }
     Result<ByteRange> open(const std::filesystem::path& path) {
         if (!many_) {
@@ -227,7 +228,7 @@ class MediaLoader {
         return {};
     }
 
-    const std::filesystem::path& folder_;
+    std::span<const std::filesystem::path> folders_;
     bool many_;
     Job& job_;
     std::uint64_t total_ = 0;
@@ -243,13 +244,14 @@ bool needsTrackFile(const ElementaryStream& stream) {
     return !first.sync || first.compositionOffset != 0;
 }
 
-Result<void> loadMedia(Document& document, const std::filesystem::path& folder, Job& job) {
+Result<void> loadMedia(Document& document, const std::vector<std::filesystem::path>& folders,
+                       Job& job) {
     std::size_t files = 0;
     STX_CHECK(forEachStream(document, [&](ElementaryStream& stream, int) -> Result<void> {
         files += stream.samples.size();
         return {};
     }));
-    MediaLoader loader(folder, files > kMostOpen, job);
+    MediaLoader loader(folders, files > kMostOpen, job);
     return forEachStream(
         document, [&](ElementaryStream& stream, int odId) { return loader.load(stream, odId); });
 }

@@ -14,11 +14,12 @@ namespace stx::mpeg4 {
 /// programs read, too: it has several pictures, or a sample entry or edits of its own.
 [[nodiscard]] bool needsTrackFile(const ElementaryStream& stream);
 
-/// Opens the files that the streams of a document (from a text) name, found in `folder`. Streams
-/// that do not say what they are get their type from the file. `name.mp4#3` is track 3 of an .mp4.
-/// Errors: (invalidInput) names that leave the folder; (io) files that are not there.
-[[nodiscard]] Result<void> loadMedia(Document& document, const std::filesystem::path& folder,
-                                     Job& job);
+/// Opens the files that the streams of a document (from a text) name, found in the first of
+/// `folders` that has them. Streams that do not say what they are get their type from the file.
+/// `name.mp4#3` is track 3 of an .mp4. Errors: (invalidInput) names that leave the folder; (io)
+/// files that are not there.
+[[nodiscard]] Result<void> loadMedia(Document& document,
+                                     const std::vector<std::filesystem::path>& folders, Job& job);
 
 /// In a scene that was made from a bundle, says what the tracks of its images are for: each gets a
 /// name, and only colour is in the movie, so that players that know no scenes have no reason to

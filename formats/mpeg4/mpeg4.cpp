@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <vector>
 
 #include "formats/files/files.hpp"
 #include "formats/files/no_case.hpp"
@@ -45,7 +46,9 @@ Result<void> writeText(const Document& source, const std::filesystem::path& path
                        Mpeg4Container container, Job& job, const OutputFile::Options& options) {
     Document document = source;
     const auto names = mediaFileNames(document);
-    const std::string folderName = mediaFolderName(path);
+    // Names in the text are found beside the file that a link leads to.
+    STX_TRY(const auto real, throughLinks(path));
+    const std::string folderName = mediaFolderName(real);
     struct Part {
         ElementaryStream* stream;
         std::string name;
@@ -101,8 +104,8 @@ Result<void> writeText(const Document& source, const std::filesystem::path& path
         for (const std::string& name : sampleFileNames(*part.stream))
             allNames.push_back(name.substr(folderName.size() + 1));
     }
-    STX_TRY(auto folder, OutputFolder::create(path.parent_path() / folderName, options,
-                                              earlierImages(path.parent_path() / folderName)));
+    const auto beside = real.parent_path() / folderName;
+    STX_TRY(auto folder, OutputFolder::create(beside, options, earlierImages(beside)));
     next = 0;
     for (const Part& part : parts) {
         STX_CHECK(job.checkCancelled());
@@ -168,7 +171,13 @@ Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job) {
     auto document = *container == Mpeg4Container::bt ? readBt(textOf(whole), path.string(), job)
                                                      : readXmt(textOf(whole), path.string(), job);
     if (!document) return document;
-    STX_CHECK(within(where, loadMedia(*document, folderOf(path), job)));
+    std::vector<std::filesystem::path> folders = {folderOf(path)};
+    // Standard input has no folder, whatever it is a link to.
+    if (folders.front() != "/dev") {
+        STX_TRY(const auto real, throughLinks(path));
+        folders.push_back(folderOf(real));
+    }
+    STX_CHECK(within(where, loadMedia(*document, folders, job)));
     return document;
 }
 

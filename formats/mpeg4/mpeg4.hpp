@@ -32,9 +32,10 @@ struct Mpeg4WriteOptions {
 };
 
 /// Writes a presentation into the container of the path's ending, whole or not at all. Beside a
-/// text is a folder of its own (mediaFolderName(): `name_images` of `name.xmt`) with the streams'
-/// bytes, untouched: images as files, all else (needsTrackFile) as an .mp4 with one track. Errors:
-/// (usage) another ending, or a text for stdout that has images; (io); what the writers say.
+/// text, or the file that its link leads to, is a folder of its own (mediaFolderName():
+/// `name_images` of `name.xmt`) with the streams' bytes, untouched: images as files, all else
+/// (needsTrackFile) as an .mp4 with one track. Errors: (usage) another ending, or a text for stdout
+/// that has images; (io); what the writers say.
 [[nodiscard]] Result<void> writeMpeg4(const Mpeg4Document& document,
                                       const std::filesystem::path& path, Job& job,
                                       const Mpeg4WriteOptions& options = {});

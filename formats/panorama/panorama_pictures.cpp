@@ -5,7 +5,9 @@
 #include "formats/files/named_files.hpp"
 #include "formats/images/exif.hpp"
 #include "formats/images/images.hpp"
+#include "formats/images/more_pictures.hpp"
 #include "formats/panorama/panorama_files.hpp"
+#include "formats/photos/file_colours.hpp"
 #include "formats/video/numbered_pictures.hpp"
 
 namespace stx {
@@ -31,6 +33,7 @@ class PictureFiles final : public PictureSource {
         for (std::size_t k = 0; k < files_.size(); ++k) {
             STX_TRY(const auto bytes, readFile(files_[k], job_.limits));
             notes_[k] = readExif(bytes);
+            noteMorePictures(bytes, files_[k].string(), job_);
         }
         return {};
     }
@@ -47,8 +50,11 @@ class PictureFiles final : public PictureSource {
         }
         STX_TRY(const auto bytes, readFile(files_[at], job_.limits));
         Rgba8Loss loss;
-        STX_TRY(Rgba8Image upright, decodeUpright(bytes, files_[at].string(), job_.limits, &loss));
+        std::string colours;
+        STX_TRY(Rgba8Image upright,
+                photos::decodeAsShown(bytes, files_[at].string(), job_.limits, colours, &loss));
         loss_.add(loss);
+        if (!colours.empty()) job_.noteOnce(colours);
         constexpr int kLeastSide = 32;
         if (std::min(upright.width(), upright.height()) < kLeastSide)
             return failAt(inQuotes(files_[at].string()), ErrorCode::invalidInput,

@@ -8,6 +8,8 @@
 #include <memory>
 #include <optional>
 
+#include "formats/images/exif.hpp"
+#include "formats/images/tiff_numbers.hpp"
 #include "formats/photos/colour_profile.hpp"
 #include "formats/photos/jpeg_segments.hpp"
 #include "formats/photos/numbers.hpp"
@@ -185,21 +187,15 @@ Bytes profileOfWebp(ByteSpan file) {
 /// Tag 34675 of the first directory (ICC.1:2022, annex B.4).
 Bytes profileOfTiff(ByteSpan file) {
     constexpr std::uint32_t kProfile = 34675;
-    const bool big = beginsWith(file, "MM");
-    const auto number = [&](std::size_t at, int size) {
-        if (at > file.size() || file.size() - at < static_cast<std::size_t>(size)) return 0u;
-        return big ? bigEndian(file, at, size) : littleEndian(file, at, size);
-    };
-    const std::size_t directory = number(4, 4), count = number(directory, 2);
-    for (std::size_t i = 0; i < count; ++i) {
-        const std::size_t entry = directory + 2 + 12 * i;
-        if (number(entry, 2) != kProfile) continue;
-        const std::size_t size = number(entry + 4, 4), at = number(entry + 8, 4);
-        if (at > file.size() || file.size() - at < size) return {};
-        const ByteSpan body = file.subspan(at, size);
-        return {body.begin(), body.end()};
-    }
-    return {};
+    const TiffLayout* const layout = tiffLayoutOf(file);
+    if (!layout) return {};
+    const TiffNumbers numbers(file);
+    const auto found =
+        findTiffEntry(numbers, *layout, numbers.at(layout->start, layout->offset), kProfile);
+    if (!found || found->number > file.size() || file.size() - found->number < found->count)
+        return {};
+    const ByteSpan body = file.subspan(found->number, found->count);
+    return {body.begin(), body.end()};
 }
 
 }  // namespace
@@ -209,9 +205,7 @@ FileColours coloursOf(ByteSpan file) {
     if (beginsWith(file, "\x89PNG\r\n\x1a\n"sv)) return coloursOfPng(file);
     if (beginsWith(file, "RIFF"sv) && file.size() >= 12 && textIn(file.subspan(8, 4)) == "WEBP")
         return {profileOfWebp(file), {}};
-    if (beginsWith(file, "II*\0"sv) || beginsWith(file, "MM\0*"sv))
-        return {profileOfTiff(file), {}};
-    return {};
+    return {profileOfTiff(file), {}};
 }
 
 void fileToSrgb(Rgba8Image& picture, ByteSpan file, std::string& note) {
@@ -227,7 +221,7 @@ RgbaFloatImage srgbFloatFrom(const DecodedImage& image, ByteSpan file, std::stri
     return out;
 }
 
-Rgba8Image srgb8From(const DecodedImage& image, ByteSpan file, std::string& note) {
+Rgba8Image srgb8From(const DecodedImage& image, ByteSpan file, std::string& note, Rgba8Loss* loss) {
     if (image.bits() == 8) {
         Rgba8Image out = rgba8From(image);
         fileToSrgb(out, file, note);
@@ -235,8 +229,9 @@ Rgba8Image srgb8From(const DecodedImage& image, ByteSpan file, std::string& note
     }
     if (image.bits() == 32 || coloursOf(file).profile.empty()) {
         if (image.bits() == 16) note = coloursOf(file).note;
-        return rgba8From(image);
+        return rgba8From(image, loss);
     }
+    if (loss) loss->add({.bits = image.bits()});
     const RgbaFloatImage fine = srgbFloatFrom(image, file, note);
     Rgba8Image out(fine.width(), fine.height());
     parallelFor(0, out.height(), [&](int y) {
@@ -245,6 +240,21 @@ Rgba8Image srgb8From(const DecodedImage& image, ByteSpan file, std::string& note
         for (std::size_t x = 0; x < to.size(); ++x) to[x] = glm::u8vec4(from[x] * 255.0f + 0.5f);
     });
     return out;
+}
+
+Result<Rgba8Image> decodeAsShown(ByteSpan file, std::string_view name, const Limits& limits,
+                                 std::string& note, Rgba8Loss* loss) {
+    Rgba8Image stored;
+    if (const auto info = probeImage(file); info && info->bits == 8) {
+        STX_SET(stored, decodeRgba8(file, name, limits, loss));
+        fileToSrgb(stored, file, note);
+    } else {
+        STX_TRY(auto image, decodeImage(file, name, limits));
+        const std::string primaries = toRec709(image);
+        stored = srgb8From(image, file, note, loss);
+        if (note.empty()) note = primaries;
+    }
+    return turnedUpright(std::move(stored), readExif(file).orientation);
 }
 
 }  // namespace stx::photos

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "formats/images/images.hpp"
 #include "lib/model/texture.hpp"
@@ -20,7 +21,13 @@ struct FileColours {
 /// where the colours are sRGB already.
 void fileToSrgb(Rgba8Image& picture, ByteSpan file, std::string& note);
 /// rgba8From() as sRGB; 16 bits are rounded behind the conversion. Floats stay as they are.
-[[nodiscard]] Rgba8Image srgb8From(const DecodedImage& image, ByteSpan file, std::string& note);
+[[nodiscard]] Rgba8Image srgb8From(const DecodedImage& image, ByteSpan file, std::string& note,
+                                   Rgba8Loss* loss = nullptr);
+/// The picture of a file as viewers show it: 8-bit sRGB, turned as its EXIF says. `name` is for
+/// messages; `note` is as of fileToSrgb(); what is lost is added to `loss`, where that is given.
+[[nodiscard]] Result<Rgba8Image> decodeAsShown(ByteSpan file, std::string_view name,
+                                               const Limits& limits, std::string& note,
+                                               Rgba8Loss* loss = nullptr);
 /// rgbaFloatFrom() as coded sRGB of 0 to 1. Floats stay as they are.
 [[nodiscard]] RgbaFloatImage srgbFloatFrom(const DecodedImage& image, ByteSpan file,
                                            std::string& note);

@@ -259,6 +259,10 @@ Result<Photo> openPhoto(const std::shared_ptr<const Bytes>& file, const PhotoOpt
         if (const auto info = probeImage(bytes)) {
             photo.colour.width = info->width;
             photo.colour.height = info->height;
+        } else {
+            const glm::ivec2 size = storedSizeOfTiff(bytes);
+            photo.colour.width = size.x;
+            photo.colour.height = size.y;
         }
         const ExifNotes exif = readExif(bytes);
         photo.orientation = exif.orientation;

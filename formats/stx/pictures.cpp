@@ -4,6 +4,7 @@
 #include "formats/images/exif.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
+#include "formats/images/more_pictures.hpp"
 #include "formats/photos/file_colours.hpp"
 #include "formats/photos/photo.hpp"
 #include "formats/stx/stx.hpp"
@@ -106,9 +107,9 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
         STX_TRY(picture.coded, within(inQuotes(path.string()), heifPicture(std::move(bytes), job)));
         return picture;
     }
+    noteMorePictures(bytes, path.string(), job);
     if (const auto info = probeImage(bytes); info && !(info->format == "png" && info->bits > 8)) {
-        STX_TRY(picture.coded, decodeUpright(bytes, path.string(), job.limits));
-        photos::fileToSrgb(picture.coded, bytes, colours);
+        STX_TRY(picture.coded, photos::decodeAsShown(bytes, path.string(), job.limits, colours));
         if (!colours.empty()) job.note(fmt::format("{}: {}", inQuotes(path.string()), colours));
         return picture;
     }

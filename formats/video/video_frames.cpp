@@ -10,6 +10,8 @@
 #include "formats/files/named_files.hpp"
 #include "formats/files/not_there.hpp"
 #include "formats/images/images.hpp"
+#include "formats/images/more_pictures.hpp"
+#include "formats/photos/file_colours.hpp"
 #include "formats/video/film.hpp"
 #include "formats/video/numbered_pictures.hpp"
 #include "formats/yuv/y4m_reader.hpp"
@@ -53,9 +55,14 @@ class PictureFrames final : public VideoFrames {
     [[nodiscard]] Result<Rgba8Image> read(std::size_t k) {
         const auto& file = files_[k];
         STX_TRY(const auto bytes, readFile(file, job_.limits));
+        noteMorePictures(bytes, file.string(), job_);
         Rgba8Loss loss;
-        STX_TRY(auto picture, decodeRgba8(bytes, file.string(), job_.limits, &loss));
+        std::string colours;
+        STX_TRY(auto picture,
+                photos::decodeAsShown(bytes, file.string(), job_.limits, colours, &loss));
         loss_.add(loss);
+        // Each frame is read several times.
+        if (!colours.empty()) job_.noteOnce(colours);
         return picture;
     }
 
@@ -128,7 +135,8 @@ class FilmFrames final : public VideoFrames {
     void noteOfColours(const VideoPicture& picture) {
         const std::string note = picture.notConverted();
         if (!note.empty() && !noted_.exchange(true))
-            job_.note(inQuotes(film_->path().filename().string()) + ": " + note);
+            job_.note(inQuotes(film_->path().filename().string()) + ": " + note +
+                      VideoPicture::kConvertFirst);
     }
 
     std::unique_ptr<Film> film_;

@@ -122,10 +122,7 @@ std::string VideoPicture::notConverted() const {
         add(matrixName(header_.matrixSaid), "matrix",
             header_.matrix == YuvMatrix::bt2020 ? "BT.2020" : "BT.709");
     if (what.empty()) return {};
-    return fmt::format(
-        "colours of the video are taken as they are, {}; to convert them first: ffmpeg -i IN -vf "
-        "zscale=p=709:t=709:m=709 -c:v ffv1 OUT.mkv",
-        fmt::join(what, ", "));
+    return fmt::format("colours of the video are taken as they are, {}", fmt::join(what, ", "));
 }
 
 Result<VideoPicture> VideoPicture::from(Bytes answer, const Limits& limits) {

@@ -27,6 +27,9 @@ class VideoPicture {
     [[nodiscard]] bool hasAlpha() const { return header_.alpha != 0; }
     /// What the stream says of its colours and colour() does not do, for a note; else empty.
     [[nodiscard]] std::string notConverted() const;
+    /// The way out of that, for a film in a file of its own.
+    static constexpr const char* kConvertFirst =
+        "; to convert them first: ffmpeg -i IN -vf zscale=p=709:t=709:m=709 -c:v ffv1 OUT.mkv";
     /// Its stream says that 16 (of 8 bits) is black; what holds depth should not.
     [[nodiscard]] bool saysLimited() const { return header_.limitedSaid != 0; }
 

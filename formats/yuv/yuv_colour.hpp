@@ -16,6 +16,7 @@ enum class YuvMatrix : std::uint8_t {
 struct YuvColour {
     YuvMatrix matrix = YuvMatrix::bt709;
     bool fullRange = false;  ///< 0..255 instead of 16..235 (of 8 bits)
+    bool operator==(const YuvColour&) const = default;
 };
 
 }  // namespace stx

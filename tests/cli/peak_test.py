@@ -437,7 +437,7 @@ def film_of_many(args, folder):
             print(f"films {name:21} {few:6.1f} MiB of {FILM_VIEWS[0]} views, {many:6.1f} of {FILM_VIEWS[1]}: {many / few:.2f}; in memory {in_memory:.1f}", flush=True)
         elif many > MOST * few + more:
             wrong.append(f"films {name}: {many:.1f} MiB of {FILM_VIEWS[1]} views, {few:.1f} of {FILM_VIEWS[0]}")
-        if name.startswith(("set", "exr")):  # of MPEG-4 decoded pictures are kept beside
+        if " to " in name:
             source = line.split()[1].replace("{}", f"film{FILM_VIEWS[1]}")
             found = json.loads(must([args.stx, "info", source, "--memory", "--threads", "2", "--format", "json"], folder).out)["memory"]
             said, = (row for row in found["commands"] if row["command"] == "convert -o NAME." + name.split()[2])

@@ -54,6 +54,17 @@ class Calls(Case):
         stx.convert(bundle, views="ring:4", size=(32, 512), job=job)
         self.assertEqual(job.notes, ("views, width are of meshes and not used: the model has views already",))
 
+    def test_video_of_a_film_of_one_frame_is_noted(self):
+        bundle = stx.Bundle([plate(stx.Camera((8, 8), 9), 2.0)])
+        for frames, notes in (([bundle], ["h264 is of films and not used: nothing moves"]), ([bundle, bundle], [])):
+            job = stx.Job()
+            try:
+                stx.Film(frames).save("one.mp4", h264=20, job=job)
+            except stx.Error as error:
+                if error.code != "unsupported":  # without the module of video
+                    raise
+            self.assertEqual([note for note in job.notes if "not used" in note], notes)
+
     def test_keywords_that_do_not_matter_to_what_is_opened_are_noted(self):
         bundle = stx.convert(self.mesh, views="ring:2", size=(32, 32))
         bundle.save("a.exr")

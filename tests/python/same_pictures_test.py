@@ -84,6 +84,19 @@ class SamePictures(Case):
             frame.save("q.png")
             self.same(f"p_{i}.png", "q.png")
 
+    def test_lit_colours_above_one(self):
+        bundle = stx.convert(MODEL, views="ring:4", size=(64, 64))
+        bundle.save("a.exr")
+        lights = [stx.Light("directional", (-1, -1, -0.5), colour=9)]
+        for mode in ("splat", "surface"):
+            run("render", "a.exr", "-o", "p.exr", "--orbit", 1, "--size", "48x48", "--mode", mode, "--light", "dir:-1,-1,-0.5,9,9,9")
+            camera = stx.orbit(bundle, 1, size=(48, 48))[0]
+            frame = stx.render(bundle, camera, mode=mode, lights=lights, normals=True, beyond_one=True)
+            self.assertGreater(frame.colour[..., :3].max(), 1)
+            frame.save("q.exr")
+            self.same("p.exr", "q.exr")
+            self.assertLessEqual(stx.render(bundle, camera, mode=mode, lights=lights).colour[..., :3].max(), 1.001)
+
     def test_pixels_are_those_of_the_png(self):
         bundle = stx.convert(MODEL, views="ring:4", size=(64, 64))
         frame = stx.render(bundle, bundle.views[1].camera)

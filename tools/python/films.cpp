@@ -85,7 +85,12 @@ void saveFilm(const FilmPointer& film, const std::filesystem::path& path, int jp
               std::optional<int> h264, bool noClobber, JobHandle* job) {
     const SaveOptions options = saveOptionsFrom(jpegQuality, h264, noClobber);
     SharedFrames frames(film);
-    run(job, [&](Job& part) { return save(frames, path, options, part); });
+    run(job, [&](Job& part) -> Result<void> {
+        STX_CHECK(save(frames, path, options, part));
+        if (h264 && !frames.timeline().moves())
+            part.noteUnused({"h264"}, "of films", "nothing moves");
+        return {};
+    });
 }
 
 /// Notes the times that are asked for outside a film.

@@ -123,8 +123,8 @@ void bindFrame(py::module_& module) {
                            "memory alive; row 0 is on top.")
         .def_property_readonly(
             "colour", image(&Frame::colour),
-            "(height, width, 4) float32, premultiplied by alpha, lit: sRGB-coded 0..1, or linear "
-            "light where `linear`.")
+            "(height, width, 4) float32, premultiplied by alpha, lit: sRGB-coded 0..1 (above it "
+            "where beyond_one lets it), or linear light where `linear`.")
         .def_property_readonly(
             "alpha",
             [image](const DrawnFrame& d) {
@@ -161,7 +161,8 @@ void bindFrame(py::module_& module) {
              py::arg("quality") = 92, py::arg("no_clobber") = false, py::arg("job") = py::none(),
              "Writes it, whole or not at all, by the ending: .png, .jpg (quality 1..100), .tif or "
              ".webp (8-bit sRGB), .exr (linear, with depth; drawn with normals=True also normals "
-             "and albedo, as 'stx render' writes them). background: grey or (r, g, b), sRGB-coded "
+             "and albedo, and with beyond_one=True lit colours above 1, as 'stx render' writes "
+             "them). background: grey or (r, g, b), sRGB-coded "
              "0..1, put behind it. no_clobber: a target that exists is an error. Raises stx.Error "
              "(usage, io).")
         .def("__repr__", [](const DrawnFrame& d) {

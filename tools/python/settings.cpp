@@ -47,6 +47,7 @@ void takeLighting(const Keywords& given, Lighting& lighting) {
     if (const auto grey = given.find("ambient")) lighting.ambient = colourFrom(*grey, "ambient");
     if (const auto grey = given.find("specular")) lighting.specular = colourFrom(*grey, "specular");
     given.take("shininess", lighting.shininess);
+    given.take("beyond_one", lighting.beyondOne);
     if (!(lighting.shininess > 0 && std::isfinite(lighting.shininess)))
         refuse("shininess is {:g}; a number above 0 is expected", lighting.shininess);
     for (const auto& [name, light] :
@@ -58,6 +59,7 @@ void takeLighting(const Keywords& given, Lighting& lighting) {
     const char* unused = lighting.ambient != usual.ambient       ? "ambient"
                          : lighting.specular != usual.specular   ? "specular"
                          : lighting.shininess != usual.shininess ? "shininess"
+                         : lighting.beyondOne                    ? "beyond_one"
                                                                  : nullptr;
     if (unused) refuse("{} is of lighting; give lights, too", unused);
 }

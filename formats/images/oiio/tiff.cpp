@@ -9,6 +9,8 @@
 #include <cstdio>
 #include <string_view>
 
+#include "formats/images/tiff_numbers.hpp"
+
 namespace stx::codecs {
 namespace {
 
@@ -51,36 +53,6 @@ void onWarning(const char* module, const char* format, std::va_list values) {
     if (kept().outerWarning) kept().outerWarning(module, format, values);
 }
 
-/// Numbers of a TIFF of either order of bytes; 0 past the end.
-class Numbers {
-  public:
-    explicit Numbers(std::span<const std::byte> file)
-        : file_(file), little_(!file.empty() && file[0] == std::byte{'I'}) {}
-    [[nodiscard]] std::uint64_t at(std::uint64_t offset, std::size_t bytes) const {
-        std::uint64_t value = 0;
-        for (std::size_t i = 0; i < bytes; ++i) {
-            const std::uint64_t from = offset + (little_ ? bytes - 1 - i : i);
-            value = value << 8 |
-                    (from < file_.size() ? std::to_integer<std::uint64_t>(file_[from]) : 0u);
-        }
-        return value;
-    }
-    void write(std::byte* to, std::uint64_t value, std::size_t bytes) const {
-        for (std::size_t i = 0; i < bytes; ++i)
-            to[i] = static_cast<std::byte>(value >> 8 * (little_ ? i : bytes - 1 - i));
-    }
-
-  private:
-    std::span<const std::byte> file_;
-    bool little_;
-};
-
-/// Sizes of what a directory is made of, in bytes.
-struct DirectoryLayout {
-    std::size_t start, count, entry, offset;  ///< of its place in the header, of its fields
-};
-constexpr DirectoryLayout kClassic = {4, 2, 12, 4}, kBig = {8, 8, 20, 8};
-
 }  // namespace
 
 TiffErrors::TiffErrors() {
@@ -101,15 +73,15 @@ const std::string& TiffErrors::first() {
 std::vector<std::byte> repairedTiff(std::span<const std::byte> file) {
     constexpr std::uint64_t kBitsPerSample = 258, kCompression = 259, kSamplesPerPixel = 277;
     constexpr std::uint64_t kShort = 3, kAdobeDeflate = 8, kDeflate = 32946;
-    const Numbers numbers(file);
-    const std::uint64_t version = numbers.at(2, 2);
-    if (version != 42 && version != 43) return {};
-    const DirectoryLayout& layout = version == 42 ? kClassic : kBig;
+    const TiffNumbers numbers(file);
+    const TiffLayout* const found = tiffLayoutOf(file);
+    if (!found) return {};
+    const TiffLayout& layout = *found;
     const std::uint64_t directory = numbers.at(layout.start, layout.offset);
     const std::uint64_t count = numbers.at(directory, layout.count);
     if (directory > file.size() || count == 0 || count > file.size() / layout.entry) return {};
     const std::uint64_t first = directory + layout.count, end = first + count * layout.entry;
-    const std::size_t valueAt = 4 + layout.offset;  // in an entry, behind tag, type and count
+    const std::size_t valueAt = layout.valueAt();
     if (end + layout.offset > file.size() || file.size() > 0xffff0000u) return {};
     std::uint64_t before = 0, deflated = 0;  // entries of smaller tags, which are in order
     bool hasBits = false, several = false;

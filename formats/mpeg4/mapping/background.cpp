@@ -85,6 +85,7 @@ Result<Environment> environmentFrom(const ShownBackground& background, const Str
                 STX_CHECK(job.limits.checkAllocation(pixels, 4, "the Background's pictures"));
             }
             STX_TRY(const auto decoded, images.decode(*texture, decode, job.limits));
+            if (!decoded.colourNote.empty()) job.noteOnce(decoded.colourNote);
             return rgba8From(decoded);
         };
         auto image = read();

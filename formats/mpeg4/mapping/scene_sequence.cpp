@@ -9,9 +9,6 @@
 namespace stx::mpeg4 {
 namespace {
 
-/// Decoded pictures that are kept, at most.
-constexpr std::uint64_t kCacheBytes = 256u << 20;
-
 class SceneSequence : public Sequence {
   public:
     SceneSequence(Document document, SceneReadOptions options)
@@ -24,9 +21,7 @@ class SceneSequence : public Sequence {
         STX_TRY(images_, StreamImages::make(document_, options_.folder, job.limits));
         STX_TRY(timeline_, timelineOf(document_, images_, options_.timesFromStart));
         // Of what stands still no picture is asked for twice.
-        if (timeline_.moves())
-            images_.keepPictures(
-                std::min<std::uint64_t>(kCacheBytes, job.limits.maxMemoryBytes / 4));
+        if (timeline_.moves()) images_.keepPictures(keptPictureBytes(job.limits));
         STX_TRY(const auto scene, composeScene(document_.frames, document_.frames.front().time));
         start_ = ownStart(scene, job.limits);
         // Once for all frames: it is what stands still.
@@ -75,6 +70,11 @@ class SceneSequence : public Sequence {
 };
 
 }  // namespace
+
+std::uint64_t keptPictureBytes(const Limits& limits) {
+    constexpr std::uint64_t kMost = 256u << 20;
+    return std::min(kMost, limits.maxMemoryBytes / 4);
+}
 
 Result<std::unique_ptr<Sequence>> sequenceFromScene(Document document,
                                                     const SceneReadOptions& options, Job& job) {

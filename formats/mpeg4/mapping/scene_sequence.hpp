@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "formats/mpeg4/mapping/mapping.hpp"
@@ -15,6 +16,9 @@ namespace stx::mpeg4 {
 [[nodiscard]] Result<std::unique_ptr<Sequence>> sequenceFromScene(Document document,
                                                                   const SceneReadOptions& options,
                                                                   Job& job);
+
+/// Bytes of decoded pictures that such a sequence keeps at most, where something moves.
+[[nodiscard]] std::uint64_t keptPictureBytes(const Limits& limits);
 
 /// The object of a presentation in a scene as it is at the moment of `images`; see
 /// bundleFromScene().

@@ -214,6 +214,7 @@ Result<DecodedImage> StreamImages::decodeVideo(const ElementaryStream& stream, s
         }
         return out;
     }
+    out.colourNote = picture->notConverted();
     STX_TRY(const auto colour, picture->colour(limits));
     out.channels = 3;
     out.channelNames = {"R", "G", "B"};

@@ -101,6 +101,8 @@ Result<ReferenceView> ViewReader::readSimpleTexture(const ViewPlan& plan) const 
     if (colourNode) {
         STX_TRY(colour, decode(colourNode, "texture"));
         if (colour.bits() == 16) job_.note("16-bit colour is read as 8 bits");
+        // Said of films, too, where the notes of later frames are dropped.
+        if (!colour.colourNote.empty()) job_.noteOnce(colour.colourNote);
     }
     const bool hasAlpha = colourNode && (colour.channels == 2 || colour.channels == 4);
     int depthBits = 16;

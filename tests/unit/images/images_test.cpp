@@ -291,7 +291,8 @@ TEST(Masks, GreyAndAlphaCountAndOneValueIsWhite) {
     const auto codes = [](std::initializer_list<glm::u8vec4> pixels) {
         Image<glm::u8vec4> picture(static_cast<int>(pixels.size()), 1);
         std::copy(pixels.begin(), pixels.end(), picture.data());
-        const auto mask = maskFrom(picture);
+        std::string note;
+        const auto mask = maskFrom(picture, note);
         return std::vector<int>(mask.pixels().begin(), mask.pixels().end());
     };
     using Codes = std::vector<int>;
@@ -301,6 +302,32 @@ TEST(Masks, GreyAndAlphaCountAndOneValueIsWhite) {
     EXPECT_EQ(codes({{0, 0, 1, 255}, {0, 0, 9, 255}, {0, 0, 0, 255}}), (Codes{0, 255, 0}));
     EXPECT_EQ(codes({{0, 0, 255, 255}, {255, 255, 255, 0}}), (Codes{255, 0}));
     EXPECT_EQ(codes({{0, 0, 0, 255}}), (Codes{0}));
+}
+
+TEST(Masks, LabelsOfEightAndSixteenBitsAreInside) {
+    using Codes = std::vector<int>;
+    const auto codes = [](std::initializer_list<int> greys, int largest, std::string& note) {
+        Image<glm::vec4> fine(static_cast<int>(greys.size()), 1);
+        Image<glm::u8vec4> coarse(fine.width(), 1);
+        int x = 0;
+        for (const int grey : greys) {
+            const float code = static_cast<float>(grey) / static_cast<float>(largest);
+            fine.at(x, 0) = glm::vec4(code, code, code, 1);
+            coarse.at(x++, 0) = glm::u8vec4(grey, grey, grey, 255);
+        }
+        const auto mask = largest == 255 ? maskFrom(coarse, note) : maskFrom(fine, note);
+        return Codes(mask.pixels().begin(), mask.pixels().end());
+    };
+    std::string note;
+    EXPECT_EQ(codes({0, 1, 1}, 65535, note), (Codes{0, 255, 255}));
+    EXPECT_EQ(note, "the one value of the mask beside 0, 1 of 65535, is taken for inside");
+    EXPECT_EQ(codes({0, 1, 1}, 255, note), (Codes{0, 255, 255}));
+    EXPECT_EQ(note, "the one value of the mask beside 0, 1 of 255, is taken for inside");
+    note.clear();
+    EXPECT_EQ(codes({0, 32768, 65535}, 65535, note), (Codes{0, 128, 255}));
+    EXPECT_EQ(codes({0, 65535}, 65535, note), (Codes{0, 255}));
+    EXPECT_EQ(codes({0, 255}, 255, note), (Codes{0, 255}));
+    EXPECT_EQ(note, "");
 }
 
 }  // namespace stx

@@ -196,18 +196,22 @@ TEST(NoDepth, MasksOfTheSetAreRead) {
 TEST(NoDepth, MasksOfOneValueBesideZeroAreWhiteThere) {
     const TemporaryFolder folder;
     writeSet(folder.path(), roomViews(), nullptr, ",\"mask_path\":\"m.png\"");
+    int bits = 8;
     const auto alphaWith = [&](const std::function<int(int, int)>& mask) {
-        writeCodes(folder / "m.png", kWidth, kHeight, 8, mask);
+        writeCodes(folder / "m.png", kWidth, kHeight, bits, mask);
         const auto read = readSet(folder.path());
         EXPECT_TRUE(read) << read.error().text();
         return read ? read->views[0].texture.at(65, 30).a : -1.0f;
     };
-    for (const int value : {1, 15, 255}) {
+    for (const auto& [bit, value] :
+         {std::pair{8, 1}, {8, 15}, {8, 255}, {16, 1}, {16, 15}, {16, 65535}}) {
         SCOPED_TRACE(value);
-        EXPECT_EQ(alphaWith([&](int x, int) { return x >= 60 ? value : 0; }), 1.0f);
-        EXPECT_EQ(alphaWith([&](int x, int) { return x < 60 ? value : 0; }), 0.0f);
-        EXPECT_EQ(alphaWith([&](int, int) { return value; }), 1.0f);
+        bits = bit;
+        EXPECT_EQ(alphaWith([&, v = value](int x, int) { return x >= 60 ? v : 0; }), 1.0f);
+        EXPECT_EQ(alphaWith([&, v = value](int x, int) { return x < 60 ? v : 0; }), 0.0f);
+        EXPECT_EQ(alphaWith([&, v = value](int, int) { return v; }), 1.0f);
     }
+    bits = 8;
     // Of several values each is a share.
     EXPECT_NEAR(alphaWith([](int x, int) { return x > 65 ? 255 : x == 65 ? 51 : 0; }), 0.2f, 1e-6f);
 }

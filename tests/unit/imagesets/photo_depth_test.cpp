@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "formats/images/exif.hpp"
+#include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/summary.hpp"
 #include "formats/photos/photo.hpp"
 #include "tests/made_photos.hpp"
@@ -193,6 +194,23 @@ TEST(PhotoDepth, OptionsOfDepthBesideAreRefusedWhereTheFileHasIt) {
     options.depthUnit = 0;
     options.photo.nearIs = NearIs::white;
     expectError(readSet(folder / "a.jpg", options), {"a.jpg", "--depth-near", "in the file"});
+}
+
+/// It was decoded for its code; the first who loads the view takes what that gave.
+TEST(PhotoDepth, IsReadOnce) {
+    GreyBeside photo(16);
+    Job job;
+    const auto set = imagesets::describeSet(photo.folder / "a.png", photo.options, job);
+    ASSERT_TRUE(set) << set.error().text();
+    std::filesystem::remove(photo.folder / "a_depth.png");
+    const imagesets::SetView& view = set->views.at(0);
+    const auto first = view.load(view, job);
+    ASSERT_TRUE(first) << first.error().text();
+    EXPECT_EQ(first->depth.at(40, 3), 50 * 150);
+    EXPECT_EQ(first->depthBits, 16);
+    const auto again = view.load(view, job);
+    ASSERT_FALSE(again);
+    EXPECT_EQ(again.error().code, ErrorCode::io);
 }
 
 /// Phones and programs that write pairs may give both files the orientation.

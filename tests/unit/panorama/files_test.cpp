@@ -111,7 +111,7 @@ TEST(PanoramaFiles, EveryEndingIsWritten) {
     }
 }
 
-Bytes jpegWithExif(bool little, int orientation, int focal35) {
+std::string tiffWithExif(bool little, int orientation, int focal35) {
     std::string tiff;
     const auto number = [&](unsigned value, int size) {
         for (int i = 0; i < size; ++i)
@@ -134,13 +134,22 @@ Bytes jpegWithExif(bool little, int orientation, int focal35) {
     number(1, 2);
     entry(0xa405, 3, static_cast<unsigned>(focal35));
     number(0, 4);
+    return tiff;
+}
+
+Bytes bytesOf(const std::string& text) {
+    const auto* bytes = reinterpret_cast<const std::byte*>(text.data());
+    return Bytes(bytes, bytes + text.size());
+}
+
+Bytes jpegWithExif(bool little, int orientation, int focal35) {
+    const std::string tiff = tiffWithExif(little, orientation, focal35);
     std::string file("\xff\xd8\xff\xe1", 4);
     const std::size_t size = tiff.size() + 8;
     file += static_cast<char>(size >> 8);
     file += static_cast<char>(size & 255);
     file += std::string("Exif\0\0", 6) + tiff + "\xff\xd9";
-    const auto* bytes = reinterpret_cast<const std::byte*>(file.data());
-    return Bytes(bytes, bytes + file.size());
+    return bytesOf(file);
 }
 
 TEST(PanoramaFiles, ExifTellsOrientationAndFocalLength) {
@@ -161,6 +170,47 @@ TEST(PanoramaFiles, ExifTellsOrientationAndFocalLength) {
     const auto xmp = std::as_bytes(std::span(kXmp));
     second.insert(second.begin() + 2, xmp.begin(), xmp.end());
     EXPECT_EQ(readExif(second).orientation, 6);
+}
+
+/// Of either order of bytes; and one whose directory is behind more than libexif reads.
+TEST(PanoramaFiles, TagsOfATiffItselfTellThemToo) {
+    for (const bool little : {true, false}) {
+        const Bytes file = bytesOf(tiffWithExif(little, 6, 28));
+        EXPECT_EQ(readExif(file).orientation, 6);
+        EXPECT_TRUE(readExif(file).oriented);
+        EXPECT_EQ(readExif(file).focal35, 28);
+        for (std::size_t n = 0; n < file.size(); ++n) {
+            const ExifNotes notes = readExif(ByteSpan(file).first(n));
+            EXPECT_TRUE(notes.orientation == 1 || notes.orientation == 6);
+        }
+    }
+    EXPECT_EQ(readExif(bytesOf(tiffWithExif(true, 9, 28))).orientation, 1);
+    // OpenImageIO and others write it into each file.
+    EXPECT_FALSE(readExif(bytesOf(tiffWithExif(true, 1, 28))).oriented);
+    EXPECT_TRUE(readExif(jpegWithExif(true, 1, 28)).oriented);
+}
+
+TEST(PanoramaFiles, BigTiffTellsItsSizeAndOrientation) {
+    std::string tiff("MM\0\x2b\0\x08\0\0", 8);
+    const auto number = [&](std::uint64_t value, int size) {
+        for (int i = size - 1; i >= 0; --i) tiff += static_cast<char>(value >> 8 * i & 255);
+    };
+    number(16, 8);
+    number(3, 8);
+    for (const auto& [tag, type, value] :
+         {std::tuple{256, 4, 70000}, std::tuple{257, 3, 12}, std::tuple{274, 3, 8}}) {
+        number(static_cast<unsigned>(tag), 2);
+        number(static_cast<unsigned>(type), 2);
+        number(1, 8);
+        // To the left in its field.
+        const int size = type == 3 ? 2 : 4;
+        number(static_cast<unsigned>(value), size);
+        number(0, 8 - size);
+    }
+    number(0, 8);
+    EXPECT_EQ(storedSizeOfTiff(bytesOf(tiff)), glm::ivec2(70000, 12));
+    EXPECT_EQ(readExif(bytesOf(tiff)).orientation, 8);
+    EXPECT_EQ(storedSizeOfTiff(jpegWithExif(true, 6, 28)), glm::ivec2(0));
 }
 
 TEST(PanoramaFiles, PicturesAreTurnedUpright) {

@@ -254,6 +254,12 @@ TEST(Films, ColoursThatAreNotConvertedAreNotedOnce) {
                                              "transfer function PQ for sRGB, matrix YCgCo for "
                                              "BT.709{}",
                                              kAdvice)});
+    EXPECT_EQ(
+        notesOf("-colorspace bt2020c -color_primaries bt709 -color_trc bt709"),
+        std::vector<std::string>{fmt::format("'f.mp4': colours of the video are taken as they are, "
+                                             "matrix BT.2020 with constant luminance for "
+                                             "BT.2020{}",
+                                             kAdvice)});
 }
 
 /// File and arguments of a coding with alpha.

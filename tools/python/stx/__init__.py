@@ -206,7 +206,7 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
            times: float | Iterable[float] | None = None, mode: str = "surface", quality: str = "normal", backend: str = "auto",
            device: int = -1, normals: bool = False, fill: str = "background", environment: Path | bool | None = None,
            lights: Sequence[Light] = (), ambient: ArrayLike = 0.2, specular: ArrayLike = 0.0, shininess: float = 32.0,
-           splat: str = "data", splat_coefficient: float = 0.0, refine: str = "auto", without: Sequence[str] = (),
+           beyond_one: bool = False, splat: str = "data", splat_coefficient: float = 0.0, refine: str = "auto", without: Sequence[str] = (),
            job: Job | None = None) -> Frame | Iterator[Frame]:
     """Draws a model: one Frame for a camera, an iterator of Frames, each drawn when it is asked for, for several.
 
@@ -215,7 +215,7 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
     or 'gl'; device: number of the GPU (-1: the best). normals: frames have normals and albedo, too, as 'stx render'
     writes them into .exr. fill: what no view shows: 'background', 'spatial' or 'none'. environment: a file that is shown
     behind everything; False: not even the model's own. lights: stx.Light; with them ambient and specular: grey or (r, g, b), linear, from 0; shininess: Phong
-    exponent above 0. splat: of splat mode, 'data', 'paper' (with splat_coefficient, pixels times scene units, 0: fitted)
+    exponent above 0; beyond_one: lit colours do not end at 1, as those that 'stx render' writes into .exr. splat: of splat mode, 'data', 'paper' (with splat_coefficient, pixels times scene units, 0: fitted)
     or 'point'. refine: repairs of captured depth, 'auto', 'off' or steps. without: names of stages that are left out.
     Raises Error: usage, invalidInput (a camera), unsupported (a backend), failed.
     """
