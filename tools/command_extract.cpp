@@ -8,6 +8,7 @@
 #include "formats/images/images.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/meshes/meshes.hpp"
+#include "formats/viewer/viewer_page.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/stopwatch.hpp"
 #include "lib/model/from_origin.hpp"
@@ -188,6 +189,7 @@ Result<Extracted> extractPly(const ExtractOptions& o, const PeakMemory& takes, S
     STX_TRY(const auto table, frames.views(moment, program.job));
     const bool normals = std::ranges::all_of(table->kinds(), &ViewImageKinds::normal);
     const glm::dvec3 origin = std::as_const(*table).about().origin;
+    noteEnvironmentLeftOut(std::as_const(*table).about().environment, program.job);
     keepFreedMemory();  // of a view, for the next one
     STX_TRY(const std::size_t count, countPoints(*table, program.job));
     STX_TRY(auto file, PlyInParts::create(o.output, {count, normals, true, false, origin},
@@ -215,6 +217,7 @@ Result<Extracted> extractPoints(const ExtractOptions& o, const PeakMemory& takes
                                 std::size_t moment, Program& program) {
     STX_TRY(const auto bundle, frames.frame(moment, program.job));
     STX_CHECK(checkPeak(takes, bundle.views, program.job.limits));
+    noteEnvironmentLeftOut(bundle.environment, program.job);
     const bool normals = std::ranges::all_of(bundle.views, &ReferenceView::hasNormals);
     Points found;
     for (const ReferenceView& view : bundle.views) found.add(view, normals);

@@ -153,6 +153,7 @@ Result<int> extractPicture(const std::string& input, const OpenOptions& open,
     STX_TRY(const auto moment,
             momentOf(time, frames->timeline(), "a picture is", input, program.job));
     STX_TRY(const auto table, frames->views(moment, program.job));
+    noteEnvironmentLeftOut(std::as_const(*table).about().environment, program.job);
     STX_TRY(const std::size_t number, namedView(view, std::as_const(*table).about().views));
     const std::uint64_t pixels = table->pixelsOf(number);
     STX_CHECK(checkPeak(peak::kExport, pixels, pixels,

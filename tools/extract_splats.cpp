@@ -11,6 +11,7 @@
 #include "formats/files/files.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/meshes/meshes.hpp"
+#include "formats/viewer/viewer_page.hpp"
 #include "lib/base/stopwatch.hpp"
 #include "lib/model/from_origin.hpp"
 #include "lib/model/translucent.hpp"
@@ -100,6 +101,7 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
         STX_TRY(auto table, frames->views(i, program.job));
         if (i == first) {
             views = table->count();
+            noteEnvironmentLeftOut(std::as_const(*table).about().environment, program.job);
             table = watchedViews(std::move(table), [&](auto k, auto& view) {
                 tally.add(k, view);
                 if (hasTranslucentInside(view.texture, view.depth)) translucent = true;

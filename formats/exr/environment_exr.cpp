@@ -5,6 +5,7 @@
 
 #include "formats/exr/exr_colour.hpp"
 #include "formats/files/text_numbers.hpp"
+#include "lib/base/placed.hpp"
 #include "lib/environment/environment_map.hpp"
 
 namespace stx {
@@ -95,15 +96,18 @@ Result<ExrEnvironmentHeader> environmentHeader(const ExrPart& part) {
                 header.faces.push_back(static_cast<CubeFace>(f));
     } else {
         e.layout = Environment::Layout::equirectangular;
-        header.size = {part.width, part.height};
+        // OpenEXR's envmap is of the data window; a picture without is the display window.
+        const bool plain = !ours && part.envmap == ExrPart::Envmap::none;
+        header.size = plain ? glm::ivec2(part.displayWidth, part.displayHeight)
+                            : glm::ivec2(part.width, part.height);
         if (part.envmap == ExrPart::Envmap::none && ours && *ours == "none") {
             e.layout = Environment::Layout::cube;
             header.size = glm::ivec2(0);
-        } else if (part.width != 2 * part.height) {
+        } else if (header.size.x != 2 * header.size.y) {
             return fail(ErrorCode::invalidInput,
                         "part '{}' is an environment with {}x{} pixels; a picture all around is "
                         "twice as wide as high",
-                        part.name, part.width, part.height);
+                        part.name, header.size.x, header.size.y);
         }
     }
     if (!ours) return header;
@@ -120,14 +124,18 @@ Result<ExrEnvironmentHeader> environmentHeader(const ExrPart& part) {
     return header;
 }
 
+/// What infinite light counts as: the largest value of half floats, which it overflowed.
+constexpr float kBrightest = 65504.0f;
+
 Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& reader, int index,
                                                                Job& job) {
     const ExrPart& part = reader.parts()[index];
     STX_TRY(auto header, within(reader.where(), environmentHeader(part)));
     auto environment = std::make_shared<Environment>(std::move(header.environment));
-    const auto count = static_cast<std::uint64_t>(part.width) * part.height;
+    const auto count = static_cast<std::uint64_t>(part.width) * part.height +
+                       static_cast<std::uint64_t>(header.size.x) * header.size.y;
     STX_CHECK(within(reader.where(),
-                     job.limits.checkAllocation(count, 2 * sizeof(glm::vec4), "the environment")));
+                     job.limits.checkAllocation(count, sizeof(glm::vec4), "the environment")));
     if (header.size.x > 0) {
         const bool rgb = part.channel("R") && part.channel("G") && part.channel("B");
         if (!rgb && !part.channel("Y"))
@@ -139,20 +147,33 @@ Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& 
         if (rgb) channels.insert(channels.end(), {{"G", at + 1, 4}, {"B", at + 2, 4}});
         if (part.channel("A")) channels.push_back({"A", at + 3, 4});
         STX_CHECK(reader.readPart(index, channels));
+        std::int64_t infinite = 0, nothing = 0;
         for (glm::vec4& p : pixels.pixels()) {
             if (!rgb) p.g = p.b = p.r;
             if (!part.channel("A")) p.a = 1.0f;
-            // Other programs' pictures of light may have holes in it.
-            for (int c = 0; c < 4; ++c)
-                if (!std::isfinite(p[c])) p[c] = 0.0f;
+            // Other programs' pictures of light may have holes in it, and suns that overflowed.
+            for (int c = 0; c < 4; ++c) {
+                if (std::isfinite(p[c])) continue;
+                p[c] = p[c] > 0 ? kBrightest : 0.0f;
+                ++(p[c] > 0 ? infinite : nothing);
+            }
             if (rgb && part.rec709FromRgb)
                 p = glm::vec4(glm::mat3(*part.rec709FromRgb) * glm::vec3(p), p.a);
         }
+        if (infinite > 0)
+            job.note(fmt::format("{}: {} values of the environment are infinite: they count as {}",
+                                 reader.where(), infinite, kBrightest));
+        if (nothing > 0)
+            job.note(fmt::format("{}: {} values of the environment are no numbers: they count as 0",
+                                 reader.where(), nothing));
         const auto texture = [&](const Image<glm::vec4>& image) {
             return header.linear ? textureFromPremultiplied(image)
                                  : textureFromPremultiplied8(image);
         };
         if (environment->layout == Environment::Layout::equirectangular) {
+            if (pixels.size() != header.size)
+                pixels = placed(pixels, {part.originX, part.originY}, header.size,
+                                glm::vec4(0, 0, 0, part.channel("A") ? 0 : 1));
             environment->pictures.push_back(texture(pixels));
         } else {
             environment->pictures.resize(6);
@@ -278,12 +299,12 @@ Result<std::shared_ptr<const Environment>> readEnvironmentExr(const std::filesys
     STX_TRY(const auto reader, ExrReader::open(path, job.limits));
     int at = environmentPartOf(reader);
     const ExrPart& first = reader.parts()[0];
-    if (at < 0 && first.width == 2 * first.height) at = 0;
+    if (at < 0 && first.displayWidth == 2 * first.displayHeight) at = 0;
     if (at < 0)
         return failAt(reader.where(), ErrorCode::invalidInput,
                       "it has no environment: no part with the attribute envmap, and its first "
                       "picture of {}x{} is not twice as wide as high",
-                      first.width, first.height);
+                      first.displayWidth, first.displayHeight);
     if (const std::string& note = reader.parts()[at].primariesNote; !note.empty())
         job.note(reader.where() + ": " + note);
     return readEnvironmentPart(reader, at, job);

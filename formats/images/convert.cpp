@@ -44,7 +44,7 @@ std::string toRec709(DecodedImage& image) {
     const int r = channelNamed(image, "R"), g = channelNamed(image, "G"),
               b = channelNamed(image, "B");
     auto* values = std::get_if<std::vector<float>>(&image.values);
-    if (image.primariesNote.empty() || !values || r < 0 || g < 0 || b < 0) return {};
+    if (image.coloursNote.empty() || !values || r < 0 || g < 0 || b < 0) return {};
     if (image.rec709FromRgb) {
         const glm::mat3 matrix(*image.rec709FromRgb);
         for (std::size_t i = 0; i < values->size(); i += static_cast<std::size_t>(image.channels)) {
@@ -56,7 +56,7 @@ std::string toRec709(DecodedImage& image) {
         }
     }
     image.rec709FromRgb.reset();
-    return std::exchange(image.primariesNote, {});
+    return std::exchange(image.coloursNote, {});
 }
 
 void Rgba8Loss::add(const Rgba8Loss& other) {

@@ -24,7 +24,7 @@ Result<DecodedImage> decodeExr(ByteSpan bytes, std::string_view name, const Limi
     image.displayHeight = part.displayHeight;
     image.linear = true;
     image.rec709FromRgb = part.rec709FromRgb;
-    image.primariesNote = part.primariesNote;
+    image.coloursNote = part.primariesNote;
     image.premultiplied = part.channel("A") != nullptr;
     constexpr std::size_t kMaxChannels = 1024;
     if (part.channels.empty() || part.channels.size() > kMaxChannels)

@@ -60,6 +60,22 @@ bool isOtherKind(ByteSpan bytes) {
     return !info && info.error().code == ErrorCode::unsupported;
 }
 
+/// What is said of a Radiance picture whose values were multiplied with factors; else empty.
+std::string noteOfFactors(ByteSpan bytes) {
+    constexpr std::size_t kMostHeader = 4096;
+    std::string_view header(reinterpret_cast<const char*>(bytes.data()),
+                            std::min(bytes.size(), kMostHeader));
+    if (!header.starts_with("#?")) return {};
+    header = header.substr(0, header.find("\n\n"));
+    for (const char* name : {"EXPOSURE", "COLORCORR"})
+        if (header.find(fmt::format("\n{}=", name)) != std::string_view::npos)
+            return fmt::format(
+                "its values are taken as they are, though {} in its header says that light was "
+                "multiplied",
+                name);
+    return {};
+}
+
 template <class T>
 Result<T> at(std::string_view name, Result<T> result) {
     if (!result) return tl::unexpected(result.error().at(fmt::format("'{}'", name)));
@@ -83,7 +99,11 @@ Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Li
                       "the image file is empty");
     if (isExr(bytes)) return decodeExr(bytes, name, limits);
     if (isNumpy(bytes)) return at(name, decodeNumpy(bytes, limits));
-    if (isOtherKind(bytes)) return at(name, decodeForeign(bytes, name, limits));
+    if (isOtherKind(bytes)) {
+        STX_TRY(auto image, at(name, decodeForeign(bytes, name, limits)));
+        image.coloursNote = noteOfFactors(bytes);
+        return image;
+    }
     const auto reader = openDirect(bytes, limits);
     if (!reader) return at<DecodedImage>(name, tl::unexpected(reader.error()));
     auto image = readDirect(**reader);

@@ -44,7 +44,7 @@ struct DecodedImage {
     /// Of linear colours whose primaries are not those of Rec. 709: what these are multiplied with
     /// to be so, by toRec709() of those who take the picture for colours.
     std::optional<glm::dmat3> rec709FromRgb;
-    std::string primariesNote;   ///< what is done about such primaries
+    std::string coloursNote;     ///< what is done about such primaries, or factors of light
     std::string colourNote;      ///< of colours of video that are not converted, for a person
     bool premultiplied = false;  ///< there is alpha, and colours hold it (EXR, TIFF)
     /// Where the stored pixels (EXR: the data window) lie in the picture (the display window), and
@@ -56,6 +56,11 @@ struct DecodedImage {
     int pictures = 1;
     [[nodiscard]] int bits() const {
         return values.index() == 0 ? 8 : values.index() == 1 ? 16 : 32;
+    }
+    /// Whether the stored pixels are not the picture, but a part of it or more.
+    [[nodiscard]] bool isPart() const {
+        return displayWidth > 0 && displayHeight > 0 &&
+               (originX != 0 || originY != 0 || displayWidth != width || displayHeight != height);
     }
 };
 

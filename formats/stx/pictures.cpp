@@ -8,6 +8,7 @@
 #include "formats/photos/file_colours.hpp"
 #include "formats/photos/photo.hpp"
 #include "formats/stx/stx.hpp"
+#include "lib/base/placed.hpp"
 #include "lib/render/compose/environment_behind.hpp"
 #include "lib/render/factory.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
@@ -59,20 +60,6 @@ class KeptRenderer final : public Renderer {
     std::shared_ptr<const Model> model_;
     std::unique_ptr<Renderer> renderer_;
 };
-
-/// A picture whose stored pixels are a part of it, as all of it: nothing is where none are.
-template <class P>
-Image<P> wholeOf(const Image<P>& stored, const DecodedImage& window, P nothing) {
-    Image<P> whole(window.displayWidth, window.displayHeight, nothing);
-    for (int y = 0; y < stored.height(); ++y) {
-        const int to = y + window.originY;
-        if (to < 0 || to >= whole.height()) continue;
-        const int from = std::max(0, -window.originX);
-        const int end = std::min(stored.width(), whole.width() - window.originX);
-        for (int x = from; x < end; ++x) whole.at(x + window.originX, to) = stored.at(x, y);
-    }
-    return whole;
-}
 
 }  // namespace
 
@@ -130,11 +117,7 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
     if (wanted) floats = photos::srgbFloatFrom(decoded, bytes, colours);
     picture.coded = photos::srgb8From(decoded, bytes, colours);
     if (!colours.empty()) job.note(fmt::format("{}: {}", inQuotes(path.string()), colours));
-    const bool isPart =
-        decoded.displayWidth > 0 && decoded.displayHeight > 0 &&
-        (decoded.originX != 0 || decoded.originY != 0 || decoded.displayWidth != decoded.width ||
-         decoded.displayHeight != decoded.height);
-    if (!isPart) {
+    if (!decoded.isPart()) {
         const int orientation = readExif(bytes).orientation;
         if (wanted) floats = turnedUpright(std::move(floats), orientation);
         picture.coded = turnedUpright(std::move(picture.coded), orientation);
@@ -146,8 +129,10 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
                                               static_cast<std::uint64_t>(decoded.displayHeight),
                                           40, "the picture")));
     const bool alpha = std::ranges::find(decoded.channelNames, "A") != decoded.channelNames.end();
-    if (wanted) floats = wholeOf(floats, decoded, glm::vec4(0, 0, 0, alpha ? 0 : 1));
-    picture.coded = wholeOf(picture.coded, decoded, glm::u8vec4(0, 0, 0, alpha ? 0 : 255));
+    const glm::ivec2 at(decoded.originX, decoded.originY);
+    const glm::ivec2 size(decoded.displayWidth, decoded.displayHeight);
+    if (wanted) floats = placed(floats, at, size, glm::vec4(0, 0, 0, alpha ? 0 : 1));
+    picture.coded = placed(picture.coded, at, size, glm::u8vec4(0, 0, 0, alpha ? 0 : 255));
     return picture;
 }
 

@@ -354,8 +354,8 @@ void noteSize(const PageReport& report, Job& job) {
 void noteEnvironmentLeftOut(const std::shared_ptr<const Environment>& environment, Job& job) {
     if (environment)
         job.note(
-            "pages and models have no place for the environment: it is left out; stx extract to a "
-            "folder writes its pictures");
+            "pages, models, points and single pictures have no place for the environment: it is "
+            "left out; stx extract to a folder writes its pictures");
 }
 
 Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path& path,

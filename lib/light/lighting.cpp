@@ -54,6 +54,9 @@ glm::vec3 shadePhong(const Lighting& lighting, glm::vec3 albedo, glm::vec3 posit
 Lighting lightsInWorld(const Lighting& lighting, const glm::dmat4& worldFromCamera) {
     Lighting out = lighting;
     for (auto& light : out.lights) {
+        // Floats cannot square the length of each direction.
+        if (light.kind == Light::Kind::directional && light.vector != glm::vec3(0.0f))
+            light.vector = glm::vec3(glm::normalize(glm::dvec3(light.vector)));
         if (!light.inCameraSpace) continue;
         const double w = light.kind == Light::Kind::point ? 1.0 : 0.0;
         light.vector = glm::vec3(worldFromCamera * glm::dvec4(light.vector, w));

@@ -224,7 +224,7 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
     if (environment) settings.fill = Fill::none;
     STX_TRY(auto made, makePlain(backend, drawn, settings, device, job));
     if (settings.does(Stage::footprint) && isOurs(backend, settings))
-        made = withFootprint(std::move(made), drawn, settings.log, job.limits);
+        made = withFootprint(std::move(made), drawn, settings.log, job);
     if (environment) made = withEnvironment(std::move(made), environment);
     return made;
 }

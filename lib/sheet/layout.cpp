@@ -60,10 +60,9 @@ Result<SheetPlan> planSheet(const SheetContent& content, const SheetSettings& se
     const glm::ivec2 most = settings.mostSize;
     const auto native = static_cast<double>(std::max(content.largest.x, content.largest.y));
     const double cap = std::max<double>(native, kFewPixels);
-    const int first = settings.columns > 0 ? settings.columns : 1;
-    const int last = settings.columns > 0
-                         ? settings.columns
-                         : std::min(content.groups, std::max(1, most.x / kLeastText));
+    const int asked = std::min(settings.columns, content.groups);
+    const int first = asked > 0 ? asked : 1;
+    const int last = asked > 0 ? asked : std::min(content.groups, std::max(1, most.x / kLeastText));
     SheetPlan best;
     best.content = content;
     best.shown = 0;
@@ -99,7 +98,7 @@ Result<SheetPlan> planSheet(const SheetContent& content, const SheetSettings& se
         best.size = size;
     }
     if (best.shown == 0) {
-        const int columns = std::max(settings.columns, 1);
+        const int columns = std::max(asked, 1);
         const glm::ivec2 group = groupSize(content, cellOf(content.largest, kLeastSide));
         const glm::ivec2 needed = sheetSize(content, group, columns, 1);
         return fail(ErrorCode::usage,

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <exception>
 #include <mutex>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "formats/decoders/decoder_module.hpp"
 #include "formats/decoders/given_file.hpp"
 #include "formats/images/codec_table.hpp"
+#include "formats/images/exif.hpp"
 #include "formats/images/oiio/bmp.hpp"
 #include "formats/images/oiio/failed.hpp"
 #include "formats/images/oiio/tiff.hpp"
@@ -170,6 +172,14 @@ void turnWhiteIsZero(const OIIO::ImageSpec& spec, const OIIO::TypeDesc& type, vo
         turn(static_cast<float*>(values), 1.0f, true);
 }
 
+/// Radiance's resolution line says where rows begin, and whether they are columns; the library
+/// gives that as an orientation of EXIF and leaves the pixels as they are stored.
+int orientationOf(const OIIO::ImageSpec& spec, const std::string& format) {
+    return format == "hdr" ? spec.get_int_attribute("Orientation", 1) : 1;
+}
+
+using HdrPixel = std::array<float, 3>;
+
 /// `fileName`: what the file can be opened by, for formats that the library reads by name only.
 void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
                    const std::string& fileName, PictureAnswer& answer) {
@@ -213,14 +223,31 @@ void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
     if (pixel.channels != 0) header.channels = pixel.channels;
     if (spec.depth > 1) throw Failed{ErrorCode::unsupported, "volume images are not supported"};
 
+    const int orientation = orientationOf(spec, format);
+    Image<HdrPixel> turned;
+    if (orientation != 1) {
+        if (type != OIIO::TypeDesc::FLOAT || spec.nchannels != 3)
+            throw Failed{ErrorCode::unsupported, "its values are no RGBE"};
+        turned = Image<HdrPixel>(spec.width, spec.height);
+        if (orientation >= 5) {
+            std::swap(header.width, header.height);
+            std::swap(header.displayWidth, header.displayHeight);
+        }
+    }
+
     void* values = answer.begin(header, names);
     std::vector<std::uint8_t> whole;  // all four bytes of a BMP's pixels
     if (pixel.channels != 0)
         whole.resize(static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height) *
                      4);
     const TiffErrors tiffErrors;
-    if (!input->read_image(0, 0, 0, spec.nchannels, type, whole.empty() ? values : whole.data()))
+    void* const stored = !turned.empty() ? turned.data() : whole.empty() ? values : whole.data();
+    if (!input->read_image(0, 0, 0, spec.nchannels, type, stored))
         failWith(input->geterror(), "the pixels cannot be decoded");
+    if (!turned.empty()) {
+        turned = turnedUpright(std::move(turned), orientation);
+        std::ranges::copy(turned.pixels(), static_cast<HdrPixel*>(values));
+    }
     // It paints black what it cannot decode, and says nothing.
     if (!tiffErrors.first().empty())
         throw Failed{ErrorCode::invalidInput,

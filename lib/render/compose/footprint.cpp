@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "lib/base/parallel.hpp"
 
 namespace stx {
@@ -25,12 +27,8 @@ constexpr std::uint64_t kBytesEach = 64;
 class FootprintRenderer final : public Renderer {
   public:
     FootprintRenderer(std::unique_ptr<Renderer> inner, const PageSet& set,
-                      std::shared_ptr<StageLog> log, const Limits& limits)
-        : inner_(std::move(inner)),
-          set_(set),
-          footprint_(set),
-          log_(std::move(log)),
-          limits_(limits) {}
+                      std::shared_ptr<StageLog> log, Job& job)
+        : inner_(std::move(inner)), set_(set), footprint_(set), log_(std::move(log)), job_(job) {}
 
     Result<Frame> render(const Camera& camera) override {
         STX_CHECK(camera.check());
@@ -67,12 +65,21 @@ class FootprintRenderer final : public Renderer {
             return 1;
         int factor = footprint_.factor(camera);
         const double pixels = static_cast<double>(camera.width) * camera.height;
-        const auto fits = [&] {
-            const double large = pixels * factor * factor;
-            return large <= kMostPixels &&
-                   limits_.checkAllocation(static_cast<std::uint64_t>(large), kBytesEach, "");
+        const auto largeOf = [&](int times) { return pixels * times * times; };
+        while (factor > 1 && largeOf(factor) > kMostPixels) --factor;
+        const int wanted = factor;
+        const auto holds = [&](int times) {
+            return job_.limits
+                .checkAllocation(static_cast<std::uint64_t>(largeOf(times)), kBytesEach, "")
+                .has_value();
         };
-        while (factor > 1 && !fits()) --factor;
+        while (factor > 1 && !holds(factor)) --factor;
+        if (factor < wanted)
+            job_.noteOnce(fmt::format(
+                "pictures are the mean of {0}x{0} smaller pixels, not of {1}x{1} as these views "
+                "need: the memory limit holds no more; --max-memory {2} would do",
+                factor, wanted,
+                static_cast<std::uint64_t>(largeOf(wanted)) * kBytesEach / (1 << 20) + 1));
         return factor;
     }
 
@@ -80,7 +87,7 @@ class FootprintRenderer final : public Renderer {
     PageSet set_;
     Footprint footprint_;
     std::shared_ptr<StageLog> log_;
-    Limits limits_;
+    Job& job_;
     bool large_ = false;  ///< the last frame came from a larger one
 };
 
@@ -227,8 +234,8 @@ Frame minified(const Frame& large, int factor) {
 }
 
 std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner, const PageSet& set,
-                                        std::shared_ptr<StageLog> log, const Limits& limits) {
-    return std::make_unique<FootprintRenderer>(std::move(inner), set, std::move(log), limits);
+                                        std::shared_ptr<StageLog> log, Job& job) {
+    return std::make_unique<FootprintRenderer>(std::move(inner), set, std::move(log), job);
 }
 
 }  // namespace stx

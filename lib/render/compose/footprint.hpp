@@ -33,10 +33,10 @@ class Footprint {
 /// A renderer that draws pictures which are smaller than the reference views as large as those, and
 /// averages: the renderers of this library look at a handful of samples for each pixel and would
 /// alias. Cameras that see the samples at up to 1.5 to the pixel, and the very cameras of reference
-/// views, are left to `inner`. Larger pictures are held to `limits` and to 16 million pixels.
+/// views, are left to `inner`. Larger pictures are held to 16 million pixels and to the limits of
+/// `job`, which must outlive this, with a note.
 [[nodiscard]] std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner,
                                                       const PageSet& set,
-                                                      std::shared_ptr<StageLog> log,
-                                                      const Limits& limits);
+                                                      std::shared_ptr<StageLog> log, Job& job);
 
 }  // namespace stx

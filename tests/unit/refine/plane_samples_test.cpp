@@ -9,7 +9,7 @@
 namespace stx {
 namespace {
 
-constexpr int kWidth = 19, kHeight = 13;
+constexpr int kAcross = 19, kDown = 13;
 
 /// The definition, of one sample.
 float differenceOf(const PixelPlane& plane, float x, float y, const PlaneSamples& samples,
@@ -20,12 +20,12 @@ float differenceOf(const PixelPlane& plane, float x, float y, const PlaneSamples
     const glm::vec4 h = other.warp.homogeneous(x + dx, y + dy, q);
     if (!(h.w > 0.0f)) return -1.0f;
     const float u = h.x / h.w, v = h.y / h.w, there = h.z / h.w;
-    if (!(u >= 0.0f && v >= 0.0f && u < kWidth && v < kHeight)) return -1.0f;
+    if (!(u >= 0.0f && v >= 0.0f && u < kAcross && v < kDown)) return -1.0f;
     const float shown = other.q->at(static_cast<int>(u), static_cast<int>(v));
     if (shown > 0.0f && shown > there * (1.0f + kSamePlaceThere)) return -1.0f;
     if (shown > 0.0f && shown < there * (1.0f - kSamePlaceThere)) return kMostDifferent;
-    const float px = std::clamp(u - 0.5f, 0.0f, kWidth - 1.0f),
-                py = std::clamp(v - 0.5f, 0.0f, kHeight - 1.0f);
+    const float px = std::clamp(u - 0.5f, 0.0f, kAcross - 1.0f),
+                py = std::clamp(v - 0.5f, 0.0f, kDown - 1.0f);
     const int x0 = static_cast<int>(px), y0 = static_cast<int>(py);
     const float tx = px - static_cast<float>(x0), ty = py - static_cast<float>(y0);
     const glm::vec3 own(samples.red[k], samples.green[k], samples.blue[k]);
@@ -33,7 +33,7 @@ float differenceOf(const PixelPlane& plane, float x, float y, const PlaneSamples
     for (int c = 0; c < 3; ++c) {
         const auto at = [&](int i, int j) {
             return static_cast<float>(
-                       other.colours->at(std::min(i, kWidth - 1), std::min(j, kHeight - 1))[c]) /
+                       other.colours->at(std::min(i, kAcross - 1), std::min(j, kDown - 1))[c]) /
                    255.0f;
         };
         const float above = at(x0, y0) * (1 - tx) + at(x0 + 1, y0) * tx;
@@ -47,8 +47,8 @@ float differenceOf(const PixelPlane& plane, float x, float y, const PlaneSamples
 TEST(PlaneSamples, DifferencesAreThoseOfTheDefinition) {
     std::mt19937 random(7);
     std::uniform_real_distribution<float> share(0.0f, 1.0f);
-    Rgba8Image colours(kWidth, kHeight);
-    Image<float> q(kWidth, kHeight, 0.0f);
+    Rgba8Image colours(kAcross, kDown);
+    Image<float> q(kAcross, kDown, 0.0f);
     for (std::size_t i = 0; i < q.count(); ++i) {
         for (int c = 0; c < 3; ++c)
             colours.data()[i][c] = static_cast<std::uint8_t>(random() & 255);
@@ -66,7 +66,7 @@ TEST(PlaneSamples, DifferencesAreThoseOfTheDefinition) {
             samples.green[k] = share(random);
             samples.blue[k] = share(random);
         }
-        const float x = kWidth * share(random), y = kHeight * share(random);
+        const float x = kAcross * share(random), y = kDown * share(random);
         const PixelPlane plane{0.5f * share(random) + 0.1f, 0.1f * (share(random) - 0.5f),
                                0.1f * (share(random) - 0.5f)};
         alignas(64) PlaneSamples::Floats found;

@@ -27,6 +27,15 @@ TEST(Lighting, HalfTheLightIsHalfTheLightOfACodedColourToo) {
     EXPECT_FLOAT_EQ(lit(oneLight(0.5f), 0.6f, true).x, 0.3f);
 }
 
+TEST(Lighting, OnlyTheDirectionOfADirectionalLightCounts) {
+    for (const float length : {1e-30f, 1e-3f, 1e3f, 1e20f, 1e38f}) {
+        Lighting lighting = oneLight(0.5f);
+        lighting.lights[0].vector *= length;
+        EXPECT_FLOAT_EQ(lit(lightsInWorld(lighting, glm::dmat4(1.0)), 0.6f, true).x, 0.3f)
+            << length;
+    }
+}
+
 TEST(Lighting, FullLightLeavesACodedColourAsItIs) {
     for (const float coded : {0.0f, 0.003f, 0.1f, 0.5f, 1.0f})
         EXPECT_NEAR(lit(oneLight(1.0f), coded, false).x, coded, 1e-4f) << coded;

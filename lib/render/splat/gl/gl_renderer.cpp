@@ -25,6 +25,11 @@ struct Targets {
     GlFramebuffer framebuffer;
 };
 
+/// Whether fixed functions have not what such light needs; see lightPoints().
+bool lightsByPoint(const Lighting& lighting) {
+    return lighting.environment || lighting.specular != glm::vec3(0.0f);
+}
+
 class GlRenderer final : public Renderer {
   public:
     GlRenderer(std::shared_ptr<EglContext> context, const PageSet& set, RenderSettings settings,
@@ -118,15 +123,11 @@ void GlRenderer::setCamera(const Camera& c) const {
 void GlRenderer::setLights(const Camera& camera) const {
     // Positions go through the modelview matrix, whose origin is the centre of the points.
     const Lighting world = lightsInWorld(settings_.lighting, camera.worldFromCamera());
-    const glm::vec4 ambient(world.ambient, 1.0f), specular(world.specular, 1.0f), black(0, 0, 0, 1);
+    const glm::vec4 ambient(world.ambient, 1.0f), black(0, 0, 0, 1);
     glLightModelfv(GL_LIGHT_MODEL_AMBIENT, &ambient.x);
-    glLightModeli(GL_LIGHT_MODEL_LOCAL_VIEWER, 1);
-    glLightModeli(GL_LIGHT_MODEL_COLOR_CONTROL, GL_SINGLE_COLOR);
     glColorMaterial(GL_FRONT_AND_BACK, GL_AMBIENT_AND_DIFFUSE);
     glEnable(GL_COLOR_MATERIAL);
     glEnable(GL_NORMALIZE);
-    glMaterialfv(GL_FRONT_AND_BACK, GL_SPECULAR, &specular.x);
-    glMaterialf(GL_FRONT_AND_BACK, GL_SHININESS, std::min(world.shininess, 128.0f));
     for (std::size_t i = 0; i < kMaxLights; ++i) {
         const auto name = static_cast<GLenum>(GL_LIGHT0 + i);
         if (i >= world.lights.size()) {
@@ -142,13 +143,14 @@ void GlRenderer::setLights(const Camera& camera) const {
         glLightfv(name, GL_POSITION, &place.x);
         glLightfv(name, GL_AMBIENT, &black.x);
         glLightfv(name, GL_DIFFUSE, &colour.x);
-        glLightfv(name, GL_SPECULAR, &colour.x);
+        glLightfv(name, GL_SPECULAR, &black.x);
         glEnable(name);
     }
 }
 
-/// Fixed functions have no light from all around: each point gets the colour that all lights
-/// together give it, as the other backends give it to each pixel.
+/// Fixed functions have no light from all around, and other highlights (Blinn's, not Phong's): each
+/// point gets the colour that all lights together give it, as the other backends give it to each
+/// pixel.
 void GlRenderer::lightPoints(const Camera& camera) {
     const Lighting world = lightsInWorld(settings_.lighting, camera.worldFromCamera());
     litColours_ = points_.coloursF;
@@ -165,7 +167,7 @@ void GlRenderer::lightPoints(const Camera& camera) {
 }
 
 void GlRenderer::drawGroups(bool lit) const {
-    const bool lightsOfPoints = lit && settings_.lighting.environment;
+    const bool lightsOfPoints = lit && lightsByPoint(settings_.lighting);
     lit = lit && !lightsOfPoints;
     const float nothing[4] = {};
     const float farthest = 1.0f;
@@ -235,7 +237,7 @@ Result<Frame> GlRenderer::render(const Camera& camera) {
     groupPoints(points_, settings_, camera, static_cast<int>(sizes[1]), groups_);
     if (!groups_.groups.empty()) {
         setCamera(camera);
-        if (lit && settings_.lighting.environment)
+        if (lit && lightsByPoint(settings_.lighting))
             lightPoints(camera);
         else if (lit)
             setLights(camera);
@@ -278,7 +280,7 @@ Result<std::unique_ptr<Renderer>> makeGlRenderer(const PageSet& set, const Rende
                     settings.lighting.lights.size(), kMaxLights);
     std::uint64_t points = 0;
     for (const Page& page : set.pages()) points += page.depth->count();
-    STX_CHECK(job.limits.checkAllocation(points, settings.lighting.environment ? 80 : 64,
+    STX_CHECK(job.limits.checkAllocation(points, lightsByPoint(settings.lighting) ? 80 : 64,
                                          "the vertex arrays of the gl backend"));
     STX_TRY(auto context, EglContext::create(device, EglContext::Profile::compatibility));
     STX_CHECK(context->requireModern("the gl backend", "--backend gpu or cpu"));
