@@ -238,7 +238,9 @@ glm::vec3 normalOf(const SplatCloud& cloud, std::size_t i, const Camera& camera)
 /// What the splats of a pixel came to, as SplatPicture::colour has it.
 glm::vec4 pixelColour(glm::vec3 sum, float alpha, bool linear) {
     if (!(alpha > 0.0f)) return glm::vec4(0.0f);
-    glm::vec3 straight = sum / alpha;
+    // Harmonics of a damaged file can lead beyond all floats.
+    constexpr float kBrightest = 65504.0f;  // the largest value of half floats, which .exr has
+    glm::vec3 straight = glm::min(sum / alpha, kBrightest);
     if (linear)
         for (int k = 0; k < 3; ++k) straight[k] = srgbFromLinear(straight[k]);
     return {straight * alpha, alpha};

