@@ -153,8 +153,8 @@ TEST(GlRenderer, HasTheHighlightsOfTheCpu) {
     const Bundle bundle = analyticBundle(AnalyticScene::object, 3);
     RenderSettings settings = splatSettings();
     settings.lighting.lights.push_back({Light::Kind::directional, {-0.5f, -0.7f, -0.5f}});
-    settings.lighting.specular = glm::vec3(0.8f);
-    settings.lighting.shininess = 10;
+    settings.lighting.specular = glm::vec3(0.5f);
+    settings.lighting.shininess = 20;
     const Camera camera = bundle.views[0].camera;
     const auto frame = test::drawOn(Backend::gl, bundle, settings, camera);
     ASSERT_TRUE(frame) << frame.error().text();
