@@ -154,7 +154,7 @@ Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& 
             // Other programs' pictures of light may have holes in it, and suns that overflowed.
             for (int c = 0; c < 4; ++c) {
                 if (std::isfinite(p[c])) continue;
-                p[c] = p[c] > 0 ? kBrightest : 0.0f;
+                p[c] = !(p[c] > 0) ? 0.0f : c < 3 ? kBrightest : 1.0f;
                 ++(p[c] > 0 ? infinite : nothing);
             }
             if (rgb && part.rec709FromRgb)

@@ -1,5 +1,7 @@
 #include "formats/images/images.hpp"
 
+#include <cstdio>
+
 #include "formats/images/exr_image.hpp"
 #include "formats/images/foreign_decode.hpp"
 #include "formats/images/npy.hpp"
@@ -67,12 +69,22 @@ std::string noteOfFactors(ByteSpan bytes) {
                             std::min(bytes.size(), kMostHeader));
     if (!header.starts_with("#?")) return {};
     header = header.substr(0, header.find("\n\n"));
-    for (const char* name : {"EXPOSURE", "COLORCORR"})
-        if (header.find(fmt::format("\n{}=", name)) != std::string_view::npos)
-            return fmt::format(
-                "its values are taken as they are, though {} in its header says that light was "
-                "multiplied",
-                name);
+    for (const char* name : {"EXPOSURE", "COLORCORR"}) {
+        const std::string field = fmt::format("\n{}=", name);
+        // Each multiplies; many programs write ones.
+        for (std::size_t at = header.find(field); at != std::string_view::npos;
+             at = header.find(field, at + 1)) {
+            const auto from = at + field.size();
+            const std::string factors(header.substr(from, header.find('\n', from) - from));
+            float k[3] = {1, 1, 1};
+            (void)std::sscanf(factors.c_str(), "%f %f %f", &k[0], &k[1], &k[2]);
+            if (k[0] != 1 || k[1] != 1 || k[2] != 1)
+                return fmt::format(
+                    "its values are taken as they are, though {} in its header says that light "
+                    "was multiplied",
+                    name);
+        }
+    }
     return {};
 }
 
