@@ -12,7 +12,6 @@
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/photos/file_colours.hpp"
-#include "lib/base/placed.hpp"
 #include "lib/environment/environment_map.hpp"
 
 namespace stx {
@@ -33,21 +32,10 @@ Result<Texture> readPicture(const fs::path& path, Job& job) {
     STX_TRY(auto decoded, decodeImage(bytes, path.string(), job.limits));
     if (const std::string note = toRec709(decoded); !note.empty()) job.note(note);
     if (decoded.bits() == 16) job.note("16-bit colour is read as 8 bits");
-    const auto displayed = static_cast<std::uint64_t>(decoded.displayWidth) * decoded.displayHeight;
-    STX_CHECK(
-        within(fmt::format("'{}'", path.string()),
-               job.limits.checkAllocation(displayed, 2 * sizeof(glm::vec4), "the environment")));
-    const bool alpha = std::ranges::find(decoded.channelNames, "A") != decoded.channelNames.end();
-    const auto shown = [&](auto image, auto black) {
-        if (alpha) black.a = 0;
-        if (decoded.isPart())
-            return placed(image, {decoded.originX, decoded.originY},
-                          {decoded.displayWidth, decoded.displayHeight}, black);
-        return turnedUpright(std::move(image), readExif(bytes).orientation);
-    };
-    if (decoded.linear) return Texture(shown(rgbaFloatFrom(decoded), glm::vec4(0, 0, 0, 1)));
+    const int orientation = readExif(bytes).orientation;
+    if (decoded.linear) return Texture(turnedUpright(rgbaFloatFrom(decoded), orientation));
     std::string note;
-    Texture picture(shown(photos::srgb8From(decoded, bytes, note), glm::u8vec4(0, 0, 0, 255)));
+    Texture picture(turnedUpright(photos::srgb8From(decoded, bytes, note), orientation));
     if (!note.empty()) job.note(note);
     return picture;
 }

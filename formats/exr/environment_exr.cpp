@@ -7,6 +7,7 @@
 #include "formats/files/text_numbers.hpp"
 #include "lib/base/placed.hpp"
 #include "lib/environment/environment_map.hpp"
+#include "lib/model/srgb8.hpp"
 
 namespace stx {
 namespace {
@@ -124,9 +125,6 @@ Result<ExrEnvironmentHeader> environmentHeader(const ExrPart& part) {
     return header;
 }
 
-/// What infinite light counts as: the largest value of half floats, which it overflowed.
-constexpr float kBrightest = 65504.0f;
-
 Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& reader, int index,
                                                                Job& job) {
     const ExrPart& part = reader.parts()[index];
@@ -154,7 +152,7 @@ Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& 
             // Other programs' pictures of light may have holes in it, and suns that overflowed.
             for (int c = 0; c < 4; ++c) {
                 if (std::isfinite(p[c])) continue;
-                p[c] = !(p[c] > 0) ? 0.0f : c < 3 ? kBrightest : 1.0f;
+                p[c] = !(p[c] > 0) ? 0.0f : c < 3 ? kLargestHalf : 1.0f;
                 ++(p[c] > 0 ? infinite : nothing);
             }
             if (rgb && part.rec709FromRgb)
@@ -162,7 +160,7 @@ Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& 
         }
         if (infinite > 0)
             job.note(fmt::format("{}: {} values of the environment are infinite: they count as {}",
-                                 reader.where(), infinite, kBrightest));
+                                 reader.where(), infinite, kLargestHalf));
         if (nothing > 0)
             job.note(fmt::format("{}: {} values of the environment are no numbers: they count as 0",
                                  reader.where(), nothing));
@@ -171,9 +169,13 @@ Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& 
                                  : textureFromPremultiplied8(image);
         };
         if (environment->layout == Environment::Layout::equirectangular) {
-            if (pixels.size() != header.size)
-                pixels = placed(pixels, {part.originX, part.originY}, header.size,
-                                glm::vec4(0, 0, 0, part.channel("A") ? 0 : 1));
+            if (pixels.size() != header.size) {
+                Image<glm::vec4> whole(header.size.x, header.size.y,
+                                       glm::vec4(0, 0, 0, part.channel("A") ? 0 : 1));
+                place(pixels.data(), pixels.size(), {part.originX, part.originY}, whole.data(),
+                      whole.size());
+                pixels = std::move(whole);
+            }
             environment->pictures.push_back(texture(pixels));
         } else {
             environment->pictures.resize(6);

@@ -6,6 +6,7 @@
 #include "formats/images/foreign_decode.hpp"
 #include "formats/images/npy.hpp"
 #include "formats/images/reader.hpp"
+#include "lib/base/placed.hpp"
 
 namespace stx {
 
@@ -62,6 +63,27 @@ bool isOtherKind(ByteSpan bytes) {
     return !info && info.error().code == ErrorCode::unsupported;
 }
 
+/// Lays what is stored into the picture that it is a part of (OpenEXR's display window).
+Result<void> placeInDisplay(DecodedImage& image, const Limits& limits) {
+    const glm::ivec2 stored(image.width, image.height), at(image.originX, image.originY),
+        whole(image.displayWidth, image.displayHeight);
+    if (whole.x < 1 || whole.y < 1 || (at == glm::ivec2(0) && stored == whole)) return {};
+    const auto pixels = static_cast<std::uint64_t>(whole.x) * static_cast<std::uint64_t>(whole.y);
+    const auto each = static_cast<std::uint64_t>(image.channels);
+    STX_CHECK(limits.checkAllocation(pixels, each * image.bits() / 8, "the picture"));
+    std::visit(
+        [&](auto& values) {
+            std::decay_t<decltype(values)> all(pixels * each);
+            place(values.data(), stored, at, all.data(), whole, image.channels);
+            values = std::move(all);
+        },
+        image.values);
+    image.width = whole.x;
+    image.height = whole.y;
+    image.originX = image.originY = 0;
+    return {};
+}
+
 /// What is said of a Radiance picture whose values were multiplied with factors; else empty.
 std::string noteOfFactors(ByteSpan bytes) {
     constexpr std::size_t kMostHeader = 4096;
@@ -109,10 +131,15 @@ Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Li
     if (bytes.empty())
         return failAt(fmt::format("'{}'", name), ErrorCode::invalidInput,
                       "the image file is empty");
-    if (isExr(bytes)) return decodeExr(bytes, name, limits);
+    if (isExr(bytes)) {
+        STX_TRY(auto image, decodeExr(bytes, name, limits));
+        STX_CHECK(at(name, placeInDisplay(image, limits)));
+        return image;
+    }
     if (isNumpy(bytes)) return at(name, decodeNumpy(bytes, limits));
     if (isOtherKind(bytes)) {
         STX_TRY(auto image, at(name, decodeForeign(bytes, name, limits)));
+        STX_CHECK(at(name, placeInDisplay(image, limits)));
         image.coloursNote = noteOfFactors(bytes);
         return image;
     }

@@ -48,7 +48,7 @@ struct DecodedImage {
     std::string colourNote;      ///< of colours of video that are not converted, for a person
     bool premultiplied = false;  ///< there is alpha, and colours hold it (EXR, TIFF)
     /// Where the stored pixels (EXR: the data window) lie in the picture (the display window), and
-    /// the size of that; other formats: 0, 0 and the image's own size.
+    /// the size of that. decodeImage() gives the picture: 0, 0 and the image's own size.
     int originX = 0, originY = 0;
     int displayWidth = 0, displayHeight = 0;
     /// That the file holds (OpenEXR: parts with colours, views of a bundle), of which this is the
@@ -57,18 +57,13 @@ struct DecodedImage {
     [[nodiscard]] int bits() const {
         return values.index() == 0 ? 8 : values.index() == 1 ? 16 : 32;
     }
-    /// Whether the stored pixels are not the picture, but a part of it or more.
-    [[nodiscard]] bool isPart() const {
-        return displayWidth > 0 && displayHeight > 0 &&
-               (originX != 0 || originY != 0 || displayWidth != width || displayHeight != height);
-    }
 };
 
-/// Decodes an image in memory: PNG, JPEG, OpenEXR and NumPy's arrays (npy.hpp) here, every other
-/// format that OpenImageIO reads in a process of its own. Header sizes are checked against the
-/// limits and against what the file can hold before pixels are allocated. `name` is for messages
-/// and for formats that only their ending shows. Safe to call from several threads, none of which
-/// waits for another.
+/// Decodes an image in memory, all of it: where a part is stored, the rest is 0. PNG, JPEG, OpenEXR
+/// and NumPy's arrays (npy.hpp) here, every other format that OpenImageIO reads in a process of its
+/// own. Header sizes are checked against the limits and against what the file can hold before
+/// pixels are allocated. `name` is for messages and for formats that only their ending shows. Safe
+/// to call from several threads, none of which waits for another.
 [[nodiscard]] Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name,
                                                const Limits& limits);
 

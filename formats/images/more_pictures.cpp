@@ -15,7 +15,7 @@ std::size_t byteOf(ByteSpan file, std::size_t at) {
 /// Directories that are no smaller copies (thumbnails) and no masks of another.
 bool tiffHasMore(ByteSpan file, const TiffLayout& layout) {
     constexpr std::uint64_t kSubfileType = 254, kReducedOrMask = 1 | 4;
-    constexpr int kMostDirectories = 64;  // in a circle there is no end
+    constexpr int kMostDirectories = 64;  // directories can point in a circle
     const TiffNumbers numbers(file);
     std::uint64_t directory = numbers.at(layout.start, layout.offset);
     for (int i = 0; i < kMostDirectories; ++i) {

@@ -16,38 +16,9 @@
 namespace stx::imagesets {
 namespace {
 
-/// An OpenEXR's data window laid into its display window, which is the picture that the camera saw.
-void placeInDisplay(DecodedImage& image) {
-    auto* values = std::get_if<std::vector<float>>(&image.values);
-    const bool same = image.originX == 0 && image.originY == 0 &&
-                      image.displayWidth == image.width && image.displayHeight == image.height;
-    if (!values || same || image.displayWidth < 1 || image.displayHeight < 1) return;
-    const auto step = static_cast<std::size_t>(image.channels);
-    std::vector<float> placed(step * static_cast<std::size_t>(image.displayWidth) *
-                              static_cast<std::size_t>(image.displayHeight));
-    const int x0 = std::max(0, image.originX);
-    const int x1 = std::min(image.displayWidth, image.originX + image.width);
-    for (int y = std::max(0, image.originY);
-         y < std::min(image.displayHeight, image.originY + image.height) && x0 < x1; ++y) {
-        const auto row = static_cast<std::size_t>(y - image.originY) * image.width;
-        std::copy_n(values->data() + (row + static_cast<std::size_t>(x0 - image.originX)) * step,
-                    static_cast<std::size_t>(x1 - x0) * step,
-                    placed.data() + (static_cast<std::size_t>(y) * image.displayWidth + x0) * step);
-    }
-    image.values = std::move(placed);
-    image.width = image.displayWidth;
-    image.height = image.displayHeight;
-}
-
 Result<DecodedImage> decode(const PictureSource& source, ByteSpan bytes, Job& job) {
     noteMorePictures(bytes, source.name, job);
     auto image = decodeImage(bytes, source.name, job.limits);
-    if (image) {
-        const auto pixels = static_cast<std::uint64_t>(std::max(0, image->displayWidth)) *
-                            static_cast<std::uint64_t>(std::max(0, image->displayHeight));
-        STX_CHECK(job.limits.checkAllocation(pixels, 8ull * image->channels, "an image"));
-        placeInDisplay(*image);
-    }
     if (image && (image->width < 1 || image->height < 1))
         return failAt(inQuotes(source.name), ErrorCode::invalidInput, "the image has no pixels");
     return image;

@@ -8,7 +8,6 @@
 #include "formats/photos/file_colours.hpp"
 #include "formats/photos/photo.hpp"
 #include "formats/stx/stx.hpp"
-#include "lib/base/placed.hpp"
 #include "lib/render/compose/environment_behind.hpp"
 #include "lib/render/factory.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
@@ -117,22 +116,9 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
     if (wanted) floats = photos::srgbFloatFrom(decoded, bytes, colours);
     picture.coded = photos::srgb8From(decoded, bytes, colours);
     if (!colours.empty()) job.note(fmt::format("{}: {}", inQuotes(path.string()), colours));
-    if (!decoded.isPart()) {
-        const int orientation = readExif(bytes).orientation;
-        if (wanted) floats = turnedUpright(std::move(floats), orientation);
-        picture.coded = turnedUpright(std::move(picture.coded), orientation);
-        return picture;
-    }
-    STX_CHECK(
-        within(inQuotes(path.string()),
-               job.limits.checkAllocation(static_cast<std::uint64_t>(decoded.displayWidth) *
-                                              static_cast<std::uint64_t>(decoded.displayHeight),
-                                          40, "the picture")));
-    const bool alpha = std::ranges::find(decoded.channelNames, "A") != decoded.channelNames.end();
-    const glm::ivec2 at(decoded.originX, decoded.originY);
-    const glm::ivec2 size(decoded.displayWidth, decoded.displayHeight);
-    if (wanted) floats = placed(floats, at, size, glm::vec4(0, 0, 0, alpha ? 0 : 1));
-    picture.coded = placed(picture.coded, at, size, glm::u8vec4(0, 0, 0, alpha ? 0 : 255));
+    const int orientation = readExif(bytes).orientation;
+    if (wanted) floats = turnedUpright(std::move(floats), orientation);
+    picture.coded = turnedUpright(std::move(picture.coded), orientation);
     return picture;
 }
 

@@ -1,20 +1,25 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 
-#include "lib/base/image.hpp"
+#include <glm/glm.hpp>
 
 namespace stx {
 
-/// A picture of this size in which `part` lies with its first pixel at `at`, cut where it reaches
-/// beyond; `nothing` is where it is not.
-template <class P>
-[[nodiscard]] Image<P> placed(const Image<P>& part, glm::ivec2 at, glm::ivec2 size, P nothing) {
-    Image<P> whole(size.x, size.y, nothing);
-    const int from = std::max(0, -at.x), end = std::min(part.width(), size.x - at.x);
-    for (int y = std::max(0, -at.y); y < std::min(part.height(), size.y - at.y); ++y)
-        for (int x = from; x < end; ++x) whole.at(x + at.x, y + at.y) = part.at(x, y);
-    return whole;
+/// Copies a part, row by row, into a picture in which its first pixel is at `at`; what reaches
+/// beyond it is left out. Of each pixel `each` values, `whole` has those of wholeSize pixels.
+template <class T>
+void place(const T* part, glm::ivec2 size, glm::ivec2 at, T* whole, glm::ivec2 wholeSize,
+           int each = 1) {
+    const int from = std::max(0, -at.x), end = std::min(size.x, wholeSize.x - at.x);
+    if (from >= end) return;
+    const auto indexOf = [&](int x, int y, int width) {
+        return (static_cast<std::size_t>(y) * width + x) * each;
+    };
+    for (int y = std::max(0, -at.y); y < std::min(size.y, wholeSize.y - at.y); ++y)
+        std::copy_n(part + indexOf(from, y, size.x), static_cast<std::size_t>(end - from) * each,
+                    whole + indexOf(from + at.x, y + at.y, wholeSize.x));
 }
 
 }  // namespace stx

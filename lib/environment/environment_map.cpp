@@ -299,11 +299,6 @@ glm::vec4 straight(glm::vec4 p) {
     return p.a > 0.0f ? glm::vec4(glm::vec3(p) / p.a, p.a) : glm::vec4(0.0f);
 }
 
-/// sRGB-coded of linear light, above 1 too.
-float codedOf(float linear) {
-    return linear > 1.0f ? srgbFromLinear(linear) : srgbByTable(linear);
-}
-
 }  // namespace
 
 struct EnvironmentMap::Pictures {
@@ -426,7 +421,7 @@ glm::vec4 EnvironmentMap::sampleTurned(glm::vec3 d, float spacing, bool linear) 
             const glm::vec3 c = p.a == 1.0f ? glm::vec3(p) : glm::vec3(p) / p.a;
             const glm::vec3 other =
                 linear ? glm::vec3(linearByTable(c.r), linearByTable(c.g), linearByTable(c.b))
-                       : glm::vec3(codedOf(c.r), codedOf(c.g), codedOf(c.b));
+                       : glm::vec3(srgbBeyondOne(c.r), srgbBeyondOne(c.g), srgbBeyondOne(c.b));
             p = glm::vec4(other * p.a, p.a);
         }
     }

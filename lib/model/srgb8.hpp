@@ -42,12 +42,15 @@ class Srgb8Tables {
     return srgb8Tables().linear(code);
 }
 
+/// The largest value of half floats, which pictures of light are stored as.
+inline constexpr float kLargestHalf = 65504.0f;
+
 /// srgbFromLinear() and linearFromSrgb() of values 0..1 (others are clamped), by tables: within a
 /// thousandth of an 8-bit step, and many times faster.
 [[nodiscard]] float srgbByTable(float linear);
-/// The same of values above 1, too, where the curve goes on.
-[[nodiscard]] float srgbBeyondOne(float linear);
 [[nodiscard]] float linearByTable(float coded);
+/// srgbByTable() of values above 1, too, where the curve goes on.
+[[nodiscard]] float srgbBeyondOne(float linear);
 
 /// The table of linearByTable(), for loops over pixels; linearTable() gives the only one.
 class LinearTable {

@@ -7,6 +7,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
+#include "lib/model/srgb8.hpp"
 #include "lib/model/texture.hpp"
 #include "lib/splats/harmonics.hpp"
 #include "lib/splats/kernels.hpp"
@@ -239,8 +240,7 @@ glm::vec3 normalOf(const SplatCloud& cloud, std::size_t i, const Camera& camera)
 glm::vec4 pixelColour(glm::vec3 sum, float alpha, bool linear) {
     if (!(alpha > 0.0f)) return glm::vec4(0.0f);
     // Harmonics of a damaged file can lead beyond all floats.
-    constexpr float kBrightest = 65504.0f;  // the largest value of half floats, which .exr has
-    glm::vec3 straight = glm::min(sum / alpha, kBrightest);
+    glm::vec3 straight = glm::min(sum / alpha, kLargestHalf);
     if (linear)
         for (int k = 0; k < 3; ++k) straight[k] = srgbFromLinear(straight[k]);
     return {straight * alpha, alpha};
