@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "formats/stx/stx.hpp"
+#include "formats/viewer/coarse_views.hpp"
 #include "formats/viewer/page_scene.hpp"
 #include "formats/viewer/page_writer.hpp"
 #include "formats/viewer/unmeasured_views.hpp"
@@ -224,7 +225,6 @@ class PageViews {
         for (std::size_t i = 0; i < table->count(); ++i) pixels += table->pixelsOf(i);
         STX_CHECK(
             checkPeak({peak::kPage.what, 0}, pixels, 0, table->bytesHeld() + most, job.limits));
-        out.about_ = headersOf(std::as_const(*table).about());
         if (table->whole() || (out.groups_.size() == 1 && out.groups_[0].size() == 1))
             STX_SET(out.bundle_, wholeBundle(std::move(table), job));
         else
@@ -232,8 +232,6 @@ class PageViews {
         return out;
     }
 
-    /// Without images.
-    [[nodiscard]] const Bundle& about() const { return about_; }
     [[nodiscard]] const PageGroups& groups() const { return groups_; }
     /// Some of the views, once each.
     Result<Bundle> take(const std::vector<std::size_t>& group, Job& job) {
@@ -245,7 +243,6 @@ class PageViews {
     }
 
   private:
-    Bundle about_;
     Bundle bundle_;  ///< with all images, if table_ is null
     std::unique_ptr<ViewTable> table_;
     PageGroups groups_;
@@ -267,6 +264,31 @@ struct Behind {
     std::optional<int> scene;  ///< none where no pixel lacks its depth
     bool leftOut = false;      ///< there was no memory for it
 };
+
+/// Puts the views of a table in memory.
+Result<void> readAll(std::unique_ptr<ViewTable>& table, Job& job) {
+    if (std::as_const(*table).whole()) return {};
+    STX_TRY(auto bundle, wholeBundle(std::move(table), job));
+    table = tableOf(std::move(bundle));
+    return {};
+}
+
+/// Takes coarse points away from the views of a frame, whose table is read for it where there is
+/// memory.
+Result<void> leaveCoarseOut(std::unique_ptr<ViewTable>& table, Job& job) {
+    const ViewTable& views = *table;
+    if (!mayHaveCoarse(views.about().views)) return {};
+    if (memoryOfAll(views, peak::kPage) > job.limits.maxMemoryBytes) {
+        job.note(
+            "points of views that others show at least twice as finely are on the page, which "
+            "stx render --mode splat leaves out: --max-memory has no room to find them");
+        return {};
+    }
+    STX_TRY(auto bundle, wholeBundle(std::move(table), job));
+    takeCoarseAway(bundle);
+    table = tableOf(std::move(bundle));
+    return {};
+}
 
 /// Writes what unmeasuredViews() gives as a scene, the last of its frame.
 Result<std::optional<int>> writeUnmeasured(PageWriter& writer, const Bundle& views,
@@ -296,10 +318,7 @@ Result<Behind> writeBehind(PageWriter& writer, std::unique_ptr<ViewTable>& table
             "--max-memory has no room to find their places");
         return Behind{std::nullopt, true};
     }
-    if (!views.whole()) {
-        STX_TRY(auto bundle, wholeBundle(std::move(table), job));
-        table = tableOf(std::move(bundle));
-    }
+    STX_CHECK(readAll(table, job));
     STX_TRY(const auto scene, writeUnmeasured(writer, std::as_const(*table).about(), options, job));
     return Behind{scene, false};
 }
@@ -364,7 +383,7 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
     std::optional<PageWriter> writer;
     Json scenes = Json::array(), data;
     PagePoints points;
-    std::size_t count = 0;
+    Bundle about;  // of the first frame, without images
     bool leftOut = false;
     for (std::size_t i = 0; i < line.count(); ++i) {
         job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(line.count()),
@@ -379,11 +398,12 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
             STX_SET(writer,
                     startPage(path, options, std::as_const(*table).about().title, line.moves()));
         STX_TRY(const Behind behind, writeBehind(*writer, table, options, job));
+        if (i == 0) about = headersOf(std::as_const(*table).about());
+        STX_CHECK(leaveCoarseOut(table, job));
         STX_TRY(auto views, PageViews::of(std::move(table), line.moves(), job));
         if (i == 0) {
-            count = views.about().views.size();
-            points.boundsKnown = views.about().bounds.has_value();
-            if (points.boundsKnown) points.bounds = *views.about().bounds;
+            points.boundsKnown = about.bounds.has_value();
+            if (points.boundsKnown) points.bounds = *about.bounds;
         }
         Json numbers = Json::array();
         for (std::size_t slot = 0; slot < views.groups().size(); ++slot) {
@@ -395,12 +415,12 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
         leftOut = leftOut || behind.leftOut;
         scenes.push_back(std::move(numbers));
         if (i > 0) continue;
-        STX_TRY(data, dataOf(views.about().views, points, views.about().origin, line, options));
+        STX_TRY(data, dataOf(about.views, points, about.origin, line, options));
     }
     data["frames"] = std::move(scenes);
     if (leftOut) data["without"] = "unmeasured";
     STX_CHECK(writer->finish(data));
-    const auto report = reportOf(*writer, count, points.count, line.count());
+    const auto report = reportOf(*writer, about.views.size(), points.count, line.count());
     noteSize(report, job);
     return report;
 }
@@ -410,7 +430,7 @@ Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::pa
     STX_CHECK(atlas.check());
     // A single view says by its depth how far away things are.
     const bool asItIs = atlas.views.size() > 1 && atlas.paddingHolds(PageSet::kPadding) &&
-                        !atlas.pages[0].texture.isLinear() &&
+                        !atlas.pages[0].texture.isLinear() && !mayHaveCoarse(atlas.views) &&
                         std::ranges::none_of(atlas.views, [](const ReferenceView& v) {
                             return v.depthBits == 32 || v.background;
                         });

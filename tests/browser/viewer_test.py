@@ -94,6 +94,7 @@ def models(test, browser, args):
     test.stx_run("extract", "atlas", "-o", "atlas.html")
     test.compare(browser, "amphora, pruned, as an atlas", "atlas.html", "atlas", "-1.5,1.4,2.2", "0,0.5,0")
     boxes(test, browser)
+    coarse_views(test, browser, args.model)
     test.stx_run("extract", "amphora.mp4", "-o", "jpeg.html", "--colour", "jpeg")
     test.compare(browser, "amphora, with JPEG", "jpeg.html", "amphora.mp4", "1.5,1.2,2.5", "0,0.5,0")
     copied_pictures(test, browser)
@@ -104,6 +105,25 @@ def models(test, browser, args):
     test.compare(browser, "amphora, from above", "amphora.html", "amphora.mp4", "0,3,0", "0,0.5,0")
     test.compare(browser, "amphora, near", "amphora.html", "amphora.mp4", "0.9,1.1,1.1", "0.1,0.7,0")
     test.compare(browser, "amphora, very near", "amphora.html", "amphora.mp4", "0.5,0.6,0.5", "-0.3,0.5,0.3", fov=80)
+
+
+def coarse_views(test, browser, model):
+    """Views of 16² among views of 256², whose splats are left out."""
+    for name, layout, size in [("fine", "sphere:16", "256x256"), ("fine/coarse", "sphere:5", "16x16")]:
+        test.stx_run("convert", model, "-o", "of_mixed.exr", "--views", layout, "--size", size)
+        test.stx_run("extract", "of_mixed.exr", "-o", name)
+    with open(test.path("fine/transforms.json")) as fine, open(test.path("fine/coarse/transforms.json")) as coarse:
+        mixed, more = json.load(fine), json.load(coarse)["frames"]
+    for frame in more:
+        frame["stx:name"] = "coarse " + frame["stx:name"]
+        for kind in ("file_path", "depth_file_path"):
+            frame[kind] = "coarse/" + frame[kind]
+    mixed["frames"] += more
+    with open(test.path("fine/mixed.json"), "w") as out:
+        json.dump(mixed, out)
+    test.stx_run("convert", "fine/mixed.json", "-o", "mixed.mp4")
+    test.stx_run("extract", "mixed.mp4", "-o", "mixed.html")
+    test.compare(browser, "amphora, coarse views among fine ones", "mixed.html", "mixed.mp4", "1.5,1.2,2.5", "0,0.5,0")
 
 
 def boxes(test, browser):

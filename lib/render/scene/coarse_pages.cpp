@@ -1,7 +1,6 @@
 #include "lib/render/scene/coarse_pages.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <functional>
 
@@ -93,41 +92,49 @@ bool isClearlyFiner(const ViewHeader& view, const ViewHeader& than) {
     return alike || kFiner * spacingAt(fine, view.farPlane) <= spacingAt(coarse, than.nearPlane);
 }
 
+Image<std::uint8_t> coarsePoints(const PageSet& set, std::size_t view) {
+    const auto views = set.views();
+    std::vector<std::size_t> finer;
+    for (std::size_t k = 0; k < views.size(); ++k)
+        if (!views[k].unread && !views[view].unread &&
+            views[k].background == views[view].background && isClearlyFiner(views[k], views[view]))
+            finer.push_back(k);
+    if (finer.empty()) return {};
+    const Camera& camera = views[view].camera;
+    Image<std::uint8_t> coarse(camera.width, camera.height, std::uint8_t{0});
+    parallelForBlocks(0, camera.height, 16, [&](std::int64_t from, std::int64_t to) {
+        for (int y = static_cast<int>(from); y < to; ++y) {
+            for (int x = 0; x < camera.width; ++x) {
+                const float z = set.depth(view, x, y);
+                if (!hasPoint(z)) continue;
+                const glm::dvec3 point =
+                    camera.position + camera.orientation * camera.unproject(x + 0.5, y + 0.5, z);
+                const double climbs = stepAt(set, view, x, y);
+                const CoarsePixel pixel{camera, point,
+                                        std::isfinite(climbs) ? climbs : spacingAt(camera, z)};
+                coarse.at(x, y) = std::ranges::any_of(
+                    finer, [&](std::size_t k) { return showsFinely(set, k, pixel); });
+            }
+        }
+    });
+    return coarse;
+}
+
 PageSet PageSet::withoutCoarse(std::int64_t& points) const {
     points = 0;
     std::vector<std::shared_ptr<Image<float>>> depths(data_->pages.size());
     std::vector<bool> kept(views().size(), true);
     for (std::size_t view = 0; view < views().size(); ++view) {
-        if (views()[view].unread) continue;
-        std::vector<std::size_t> finer;
-        for (std::size_t k = 0; k < views().size(); ++k)
-            if (!views()[k].unread && views()[k].background == views()[view].background &&
-                isClearlyFiner(views()[k], views()[view]))
-                finer.push_back(k);
-        if (finer.empty()) continue;
         settle();
-        const Camera& camera = views()[view].camera;
-        Image<std::uint8_t> needless(camera.width, camera.height, std::uint8_t{0});
-        std::atomic<bool> all = true;
-        parallelForBlocks(0, camera.height, 16, [&](std::int64_t from, std::int64_t to) {
-            for (int y = static_cast<int>(from); y < to; ++y) {
-                for (int x = 0; x < camera.width; ++x) {
-                    const float z = depth(view, x, y);
-                    if (!hasPoint(z)) continue;
-                    const glm::dvec3 point =
-                        camera.position +
-                        camera.orientation * camera.unproject(x + 0.5, y + 0.5, z);
-                    const double climbs = stepAt(*this, view, x, y);
-                    const CoarsePixel pixel{camera, point,
-                                            std::isfinite(climbs) ? climbs : spacingAt(camera, z)};
-                    needless.at(x, y) = std::ranges::any_of(
-                        finer, [&](std::size_t k) { return showsFinely(*this, k, pixel); });
-                    if (!needless.at(x, y)) all = false;
-                }
-            }
-        });
-        const auto count = std::ranges::count(needless.pixels(), 1);
+        const Image<std::uint8_t> coarse = coarsePoints(*this, view);
+        if (coarse.empty()) continue;
+        const auto count = std::ranges::count(coarse.pixels(), 1);
         points += count;
+        const Camera& camera = views()[view].camera;
+        bool all = true;
+        for (int y = 0; y < camera.height && all; ++y)
+            for (int x = 0; x < camera.width && all; ++x)
+                all = coarse.at(x, y) != 0 || !hasPoint(depth(view, x, y));
         kept[view] = !all;
         if (all || count == 0) continue;
         for (const PageRectangle& r : rectanglesOf(view)) {
@@ -137,7 +144,7 @@ PageSet PageSet::withoutCoarse(std::int64_t& points) const {
                  ++y)
                 for (int x = std::max(r.x0 - kPadding, 0);
                      x < std::min(r.x1 + kPadding, camera.width); ++x)
-                    if (needless.at(x, y)) image->data()[r.texel(x, y)] = kNoDepth;
+                    if (coarse.at(x, y)) image->data()[r.texel(x, y)] = kNoDepth;
         }
     }
     const bool complete = std::ranges::all_of(kept, std::identity());

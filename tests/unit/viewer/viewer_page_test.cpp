@@ -10,6 +10,7 @@
 #include "formats/viewer/page_scene.hpp"
 #include "formats/viewer/page_text.hpp"
 #include "lib/packing/packing.hpp"
+#include "lib/render/bench/analytic_scene.hpp"
 #include "tests/small_bundle.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/torus_bundle.hpp"
@@ -331,7 +332,7 @@ TEST(ViewerPage, HoldsAsManyViewsAsThereIsMemoryFor) {
 TEST(ViewerPage, TakesAnAtlasAsItIs) {
     const TemporaryFolder folder;
     Job job;
-    const Bundle bundle = smallBundle(4, 16, false, false);
+    const Bundle bundle = torusViews(64);
     const auto atlas = pack(bundle, {}, job);
     ASSERT_TRUE(atlas);
     ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "a.html", {"atlas", {}, {}, {}}, job));
@@ -546,6 +547,51 @@ TEST(ViewerPage, SaysThatColoursWithoutDepthHaveNoRoom) {
     const Json data = readPage(folder.path() / "a.html").json("data");
     EXPECT_EQ(data["frames"][0].size(), 1u);
     EXPECT_EQ(data["without"], "unmeasured") << "the command draws what the page shows";
+}
+
+/// Their splats stick out beyond the outlines that finer views know.
+TEST(ViewerPage, LeavesOutPointsThatOthersShowMoreFinely) {
+    const TemporaryFolder folder;
+    Bundle mixed;
+    const auto viewOf = [](double number, int side) {
+        return viewOfAnalyticScene(
+            AnalyticScene::object,
+            analyticCamera(AnalyticScene::object, number, 8).resized(side, side), 2);
+    };
+    for (int i = 0; i < 8; ++i) mixed.views.push_back(viewOf(i, 96));
+    const Bundle fine = mixed;
+    mixed.views.push_back(viewOf(2.2, 12));
+    const std::int64_t points = fine.pointCount();
+    ASSERT_GT(mixed.pointCount(), points);
+    for (const bool memory : {true, false}) {
+        Job job;
+        OnDemand views(mixed);
+        // A view at a time has room.
+        if (!memory) job.limits.maxMemoryBytes = 1'000'000;
+        const auto page =
+            writeViewerPage(views, folder.path() / "page.html", {"a.exr", {}, {}, {}}, job);
+        ASSERT_TRUE(page) << page.error().text();
+        EXPECT_EQ(page->points, memory ? points : mixed.pointCount());
+        EXPECT_EQ(page->views, 9u);
+        // Where the object is not, says a view that is drawn from: such a coarse one may not.
+        const ReadPage read = readPage(folder.path() / "page.html");
+        EXPECT_EQ(read.json("scene0")["views"].size(), memory ? 8u : 9u);
+        EXPECT_EQ(read.json("data")["cameras"].size(), 9u);
+        const auto notes = job.takeNotes();
+        EXPECT_EQ(std::ranges::count_if(notes,
+                                        [](const std::string& note) {
+                                            return note.find("twice as finely") !=
+                                                   std::string::npos;
+                                        }),
+                  memory ? 0 : 1);
+    }
+    Job job;
+    const auto atlas = pack(mixed, {}, job);
+    ASSERT_TRUE(atlas);
+    const auto page =
+        writeViewerPage(*atlas, folder.path() / "atlas.html", {"a.exr", {}, {}, {}}, job);
+    ASSERT_TRUE(page) << page.error().text();
+    EXPECT_EQ(page->points, points);
 }
 
 TEST(ViewerPage, LeavesNothingWhenItFails) {
