@@ -121,6 +121,17 @@ Result<void> checkPaths(const CLI::App& app, const PathOptions& paths) {
     return {};
 }
 
+/// CLI11 takes the next word for the value of "--light=".
+Result<void> checkValuesGiven(int argc, char** argv) {
+    for (int i = 1; i < argc && std::string_view(argv[i]) != "--"; ++i) {
+        const std::string_view word = argv[i];
+        if (word.starts_with("--") && word.find('=') == word.size() - 1)
+            return fail(ErrorCode::usage, "'{}' has no value; it is expected right behind the '='",
+                        word);
+    }
+    return {};
+}
+
 Error usageError(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
     const CLI::App& where = chosen(app);
     std::string message = error.what();
@@ -346,6 +357,7 @@ Command CommandLine::add(const std::string& name, const std::string& help) {
 }
 
 Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
+    STX_CHECK(checkValuesGiven(argc, argv));
     try {
         app_->parse(argc, argv);
     } catch (const CLI::CallForHelp&) {

@@ -37,6 +37,11 @@ Result<Shown> writePage(const std::string& input, const OpenOptions& open,
     // Without its folder: pages of the same input are the same wherever it lies.
     const std::filesystem::path path(input);
     write.input = (path.has_filename() ? path : path.parent_path()).filename().string();
+    if (!open.object.empty()) write.renderOptions = {"--object", open.object};
+    if (refine != "auto") {
+        write.renderOptions.push_back("--refine");
+        write.renderOptions.push_back(refine);
+    }
     write.output = program.outputOptions();
     STX_TRY(const auto kind, recognise(input));
     Result<PageReport> page = PageReport();

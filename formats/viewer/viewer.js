@@ -5,7 +5,9 @@ class Viewer {
         this.canvas = document.getElementById("canvas");
         this.scenes = new Map();  // number -> Scene, the last used at the end
         this.shown = [];
+        this.shownNumbers = this.wantedNumbers = [];  // of scenes; wanted is what showFrame() waits for
         this.frame = 0;
+        this.leastKept = 4;  // scenes
         this.pointers = new Map();
         this.quick = false;
         this.slow = false;
@@ -17,7 +19,13 @@ class Viewer {
         this.painter = new Painter(this.canvas);
         this.canvas.addEventListener("webglcontextlost", (event) => {
             event.preventDefault();
-            this.say("The device lost the pictures. Load the page again.");
+            this.scenes.clear();
+            this.shown = [];
+            this.say("The device lost the pictures. Load the page again, where they do not come back.");
+        });
+        this.canvas.addEventListener("webglcontextrestored", () => {
+            this.painter = new Painter(this.canvas);
+            this.showFrame(this.frame).then(() => this.say(""));
         });
         this.fillPanel();
         this.reset();
@@ -52,10 +60,10 @@ class Viewer {
         this.scenes.set(number, loading);
         const scene = await loading;
         // About 20 bytes a pixel: half a gigabyte of moments.
-        const most = Math.max(4, Math.floor(25e6 / scene.texels));
+        const most = Math.max(this.leastKept, Math.floor(25e6 / scene.texels));
         for (const [old, kept] of this.scenes) {
             if (this.scenes.size <= most) break;
-            if (this.shownNumbers && this.shownNumbers.includes(old) || old === number) continue;
+            if (this.shownNumbers.includes(old) || this.wantedNumbers.includes(old)) continue;
             this.scenes.delete(old);
             Promise.resolve(kept).then((s) => s.release());
         }
@@ -64,9 +72,9 @@ class Viewer {
 
     async showFrame(frame) {
         this.frame = frame;
-        const numbers = this.data.frames[frame];
+        const numbers = this.wantedNumbers = this.data.frames[frame];
         const scenes = await Promise.all(numbers.map((n) => this.sceneOf(n)));
-        if (this.frame !== frame) return;
+        if (this.wantedNumbers !== numbers || this.painter.gl.isContextLost()) return;
         this.shownNumbers = numbers;
         this.shown = scenes;
         document.getElementById("time").value = frame;
@@ -86,7 +94,7 @@ class Viewer {
         const button = document.getElementById("play");
         button.textContent = this.playing ? "Stop" : "Play";
         button.setAttribute("aria-pressed", String(this.playing));
-        if (!this.playing) return;
+        if (!this.playing) return this.writeAddress();
         const first = this.data.times[0], length = this.data.end - first;
         const begun = performance.now() - (this.data.times[this.frame] - first) * 1000;
         const step = async () => {
@@ -139,6 +147,21 @@ class Viewer {
     // ---- Look ----
 
     value(id) { return Number(document.getElementById(id).value); }
+    // Gives a slider a value, beyond its ends, too.
+    setValue(id, value) {
+        const slider = document.getElementById(id);
+        if (value < Number(slider.min)) slider.min = value;
+        if (value > Number(slider.max)) slider.max = value;
+        slider.value = value;
+        if (id === "splat-size") document.getElementById("splat-text").textContent = Number(value.toFixed(2));
+    }
+    // Whether a slider has another value than at the start.
+    isSet(id) {
+        const slider = document.getElementById(id);
+        return slider.value !== slider.defaultValue;
+    }
+
+    backgroundColour() { return this.background || document.getElementById("background").value; }
 
     lightDirection() {
         const up = unit(this.data.start.up), back = minus(this.data.start.eye, this.data.start.target);
@@ -149,7 +172,7 @@ class Viewer {
     }
 
     look() {
-        const hex = this.background || document.getElementById("background").value;
+        const hex = this.backgroundColour();
         return {
             background: [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255),
             splatSize: this.value("splat-size"),
@@ -210,10 +233,16 @@ class Viewer {
 
     writeAddress() {
         const c = this.camera, parts = [`eye=${this.world(c.eye)}`, `target=${this.world(c.target)}`];
-        if (this.plain(c.up) !== "0,1,0") parts.push(`up=${this.plain(c.up)}`);
+        if (this.plain(c.up) !== this.plain(this.data.start.up)) parts.push(`up=${this.plain(c.up)}`);
         parts.push(`fov=${Number(c.fov.toFixed(4))}`);
         if (this.frame > 0) parts.push(`time=${this.data.times[this.frame]}`);
         if (document.getElementById("light").checked) parts.push(`light=${this.plain(this.lightDirection())}`);
+        for (const [name, id] of [["ambient", "ambient"], ["specular", "specular"], ["splat", "splat-size"]])
+            if (this.isSet(id)) parts.push(`${name}=${this.value(id)}`);
+        const background = this.backgroundColour();
+        if (background !== document.getElementById("background").options[0].value) parts.push(`background=%23${background.slice(1)}`);
+        if (this.size) parts.push(`size=${this.size.join("x")}`);
+        if (document.getElementById("panel").hidden) parts.push("ui=off");
         try {
             history.replaceState(null, "", "#" + parts.join("&"));
         } catch (error) {
@@ -221,6 +250,7 @@ class Viewer {
         }
     }
 
+    // Takes all from the address; what it does not name is as at the start.
     readAddress() {
         const decoded = (text) => {
             try {
@@ -234,26 +264,32 @@ class Viewer {
             const list = (fields.get(name) || "").split(",").map(Number);
             return fields.has(name) && list.length === count && list.every(Number.isFinite) ? list : null;
         };
-        const c = this.camera, eye = numbers("eye", 3), target = numbers("target", 3), up = numbers("up", 3), fov = numbers("fov", 1);
-        if (eye) c.eye = minus(eye, this.data.origin);
-        if (target) c.target = minus(target, this.data.origin);
-        if (up && lengthOf(up) > 0) c.up = up;
-        if (fov && fov[0] > 0 && fov[0] < 180) {
-            c.fov = fov[0];
-            document.getElementById("fov").value = c.fov;
-        }
-        const time = numbers("time", 1), light = numbers("light", 3), splat = numbers("splat", 1);
-        if (time) this.frame = this.frameAt(time[0]);
-        if (splat && splat[0] > 0) document.getElementById("splat-size").value = splat[0];
-        if (light && lengthOf(light) > 0) this.setLight(light);
-        for (const name of ["ambient", "specular"]) if (numbers(name, 1)) document.getElementById(name).value = numbers(name, 1)[0];
         const size = (fields.get("size") || "").match(/^(\d+)x(\d+)$/), most = this.painter.mostSide;
         this.size = size ? [Number(size[1]), Number(size[2])] : null;
         if (size && !this.size.every((side) => side >= 1 && side <= most))
             throw new Error(`#size=${size[0]} is not possible; on this device sides have 1 to ${most} pixels`);
         if (size) Object.assign(this.canvas.style, {width: size[1] + "px", height: size[2] + "px"});
-        if (/^#[0-9a-f]{6}$/i.test(fields.get("background") || "")) this.background = fields.get("background");
-        if (fields.get("ui") === "off") document.getElementById("panel").hidden = true;
+        this.reset();
+        const c = this.camera, eye = numbers("eye", 3), target = numbers("target", 3), up = numbers("up", 3), fov = numbers("fov", 1);
+        if (eye) c.eye = minus(eye, this.data.origin);
+        if (target) c.target = minus(target, this.data.origin);
+        if (up && lengthOf(up) > 0) c.up = up;
+        if (fov && fov[0] > 0 && fov[0] < 180) c.fov = fov[0];
+        this.setValue("fov", c.fov);
+        const time = numbers("time", 1), light = numbers("light", 3), splat = numbers("splat", 1);
+        this.frame = time ? this.frameAt(time[0]) : 0;
+        for (const id of ["light-turn", "light-height", "ambient", "specular", "splat-size"])
+            this.setValue(id, Number(document.getElementById(id).defaultValue));
+        if (splat && splat[0] > 0) this.setValue("splat-size", splat[0]);
+        document.getElementById("light").checked = false;
+        if (light && lengthOf(light) > 0) this.setLight(light);
+        for (const name of ["ambient", "specular"]) {
+            const amount = numbers(name, 1);
+            if (amount && amount[0] >= 0) this.setValue(name, amount[0]);
+        }
+        this.background = /^#[0-9a-f]{6}$/i.test(fields.get("background") || "") ? fields.get("background") : "";
+        document.getElementById("background").selectedIndex = 0;
+        document.getElementById("panel").hidden = fields.get("ui") === "off";
     }
 
     // The sliders for a light that travels in a direction.
@@ -262,16 +298,16 @@ class Viewer {
         const back = minus(this.data.start.eye, this.data.start.target);
         const front = unit(minus(back, times(up, dot(back, up)))), side = cross(up, front);
         document.getElementById("light").checked = true;
-        document.getElementById("light-height").value = Math.asin(Math.max(-1, Math.min(1, dot(from, up)))) * 180 / Math.PI;
-        document.getElementById("light-turn").value = Math.atan2(dot(from, side), dot(from, front)) * 180 / Math.PI;
+        this.setValue("light-height", Math.asin(Math.max(-1, Math.min(1, dot(from, up)))) * 180 / Math.PI);
+        this.setValue("light-turn", Math.atan2(dot(from, side), dot(from, front)) * 180 / Math.PI);
     }
 
     command() {
         const quoted = (text) => /^[\w@%+=:,./-]+$/.test(text) ? text : "'" + text.replace(/'/g, "'\\''") + "'";
         const c = this.camera, [width, height] = this.canvasSize(), look = this.look();
-        const words = ["stx render", quoted(this.data.input), "-o view.png --mode splat", `--eye=${this.world(c.eye)}`,
-                       `--target=${this.world(c.target)}`];
-        if (this.plain(c.up) !== "0,1,0") words.push(`--up=${this.plain(c.up)}`);
+        const words = ["stx render", quoted(this.data.input), ...this.data.options.map(quoted), "-o view.png --mode splat",
+                       `--eye=${this.world(c.eye)}`, `--target=${this.world(c.target)}`];
+        if (this.plain(c.up) !== this.plain(this.data.up)) words.push(`--up=${this.plain(c.up)}`);
         words.push(`--fov ${Number(c.fov.toFixed(4))}`, `--size ${width}x${height}`,
                    `--background ${look.background.map((x) => Number(x.toFixed(4))).join(",")}`);
         if (this.data.frames.length > 1) words.push(`--time ${this.data.times[this.frame]}`);
@@ -279,6 +315,7 @@ class Viewer {
         if (look.light.on)
             words.push(`--light=dir:${this.plain(look.light.direction)}`, `--ambient ${look.light.ambient}`,
                        `--specular ${look.light.specular}`, `--shininess ${look.light.shininess}`);
+        if (this.isSet("splat-size")) words.push("  # splats of their own size: stx render has no other");
         return words.join(" ");
     }
 
@@ -297,7 +334,6 @@ class Viewer {
         const time = document.getElementById("time");
         document.getElementById("time-row").hidden = this.data.frames.length < 2;
         time.max = this.data.frames.length - 1;
-        document.getElementById("fov").value = this.data.start.fov;
         document.getElementById("facts").textContent = this.data.facts;
         const views = document.getElementById("view");
         this.data.cameras.forEach((camera, i) => views.add(new Option(`view ${i}: ${camera.name}`, String(i))));
@@ -315,11 +351,11 @@ class Viewer {
         on("background", "change", () => (this.background = "", keep()));
         on("light-moves", "change", () => this.moveLight());
         on("splat-size", "input", () => {
-            document.getElementById("splat-text").textContent = document.getElementById("splat-size").value;
+            this.setValue("splat-size", this.value("splat-size"));
             this.redraw(true);
         });
         on("fov", "input", () => (this.camera.fov = this.value("fov"), this.changed()));
-        on("time", "input", () => (this.play(false), this.showFrame(this.value("time"))));
+        on("time", "input", () => (this.play(false), this.showFrame(this.value("time")).then(() => this.writeAddress())));
         on("play", "click", () => this.play(!this.playing));
         on("reset", "click", () => (this.reset(), this.changed()));
         on("command", "click", () => this.showCommand());
@@ -409,11 +445,14 @@ class Viewer {
     // The place of a reference view; its lens as far as one angle says it.
     fromView(number) {
         if (number === "") return;
-        const view = this.data.cameras[Number(number)], axes = axesOf(view.orientation);
+        // In films cameras may move: as it is now, where that is drawn.
+        const first = this.data.cameras[Number(number)];
+        const view = this.shown.flatMap((scene) => scene.views).find((v) => v.name === first.name) || first;
+        const axes = axesOf(view.orientation);
         const ahead = times(axes[2], -1), c = this.camera;
         const reach = Math.max(1e-9, dot(minus(this.data.start.centre, view.position), ahead)) || this.data.start.radius;
         Object.assign(c, {eye: view.position.slice(), target: plus(view.position, times(ahead, reach)), up: axes[1]});
-        if (view.fov > 0) c.fov = view.fov;
+        if (!view.orthographic) c.fov = 2 * Math.atan(0.5 * view.height / view.fy) * 180 / Math.PI;
         this.redraw();
         this.writeAddress();
     }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include "formats/stx/stx.hpp"
 #include "formats/viewer/coarse_views.hpp"
@@ -127,10 +128,7 @@ Result<Json> dataOf(const std::vector<ReferenceView>& views, const PagePoints& p
     for (const ReferenceView& view : views) {
         if (view.background) continue;
         cameras.push_back(view.camera);
-        Json j = pageCamera(view.camera, view.name);
-        const Camera& c = view.camera;
-        j["fov"] = c.orthographic ? 0.0 : glm::degrees(2 * std::atan(0.5 * c.height / c.fy));
-        listed.push_back(std::move(j));
+        listed.push_back(pageCamera(view.camera, view.name));
     }
     const bool single = cameras.size() == 1 && !cameras[0].orthographic;
     if (cameras.empty()) {
@@ -139,6 +137,8 @@ Result<Json> dataOf(const std::vector<ReferenceView>& views, const PagePoints& p
     Json j;
     j["version"] = 1;
     j["input"] = options.input;
+    j["options"] = options.renderOptions;
+    j["up"] = listOf(upOfCameras(cameras));  // without --up
     j["facts"] = fmt::format("{}, {}", counted(views.size(), "view"),
                              counted(static_cast<std::size_t>(points.count), "point"));
     j["origin"] = listOf(origin);
@@ -259,11 +259,8 @@ void look(const Bundle& views, PagePoints& points) {
     points.nearPlane = first.nearPlane;
 }
 
-/// What is drawn behind the views of a frame, made of them.
-struct Behind {
-    std::optional<int> scene;  ///< none where no pixel lacks its depth
-    bool leftOut = false;      ///< there was no memory for it
-};
+/// Stages of `stx render` for which there was no memory, by name.
+using LeftOut = std::set<std::string>;
 
 /// Puts the views of a table in memory.
 Result<void> readAll(std::unique_ptr<ViewTable>& table, Job& job) {
@@ -275,13 +272,14 @@ Result<void> readAll(std::unique_ptr<ViewTable>& table, Job& job) {
 
 /// Takes coarse points away from the views of a frame, whose table is read for it where there is
 /// memory.
-Result<void> leaveCoarseOut(std::unique_ptr<ViewTable>& table, Job& job) {
+Result<void> leaveCoarseOut(std::unique_ptr<ViewTable>& table, LeftOut& leftOut, Job& job) {
     const ViewTable& views = *table;
     if (!mayHaveCoarse(views.about().views)) return {};
     if (memoryOfAll(views, peak::kPage) > job.limits.maxMemoryBytes) {
         job.note(
             "points of views that others show at least twice as finely are on the page, which "
             "stx render --mode splat leaves out: --max-memory has no room to find them");
+        leftOut.insert("coarse");
         return {};
     }
     STX_TRY(auto bundle, wholeBundle(std::move(table), job));
@@ -308,19 +306,19 @@ Result<std::optional<int>> writeUnmeasured(PageWriter& writer, const Bundle& vie
 }
 
 /// The same of a frame, whose table is read for it where there is memory.
-Result<Behind> writeBehind(PageWriter& writer, std::unique_ptr<ViewTable>& table,
-                           const PageOptions& options, Job& job) {
+Result<std::optional<int>> writeBehind(PageWriter& writer, std::unique_ptr<ViewTable>& table,
+                                       const PageOptions& options, LeftOut& leftOut, Job& job) {
     const ViewTable& views = *table;
-    if (std::ranges::none_of(views.about().views, mayHaveUnmeasured)) return Behind();
+    if (std::ranges::none_of(views.about().views, mayHaveUnmeasured)) return std::nullopt;
     if (memoryOfUnmeasured(views) > job.limits.maxMemoryBytes) {
         job.note(
             "colours without depth are not on the page, which stx render draws behind all else: "
             "--max-memory has no room to find their places");
-        return Behind{std::nullopt, true};
+        leftOut.insert("unmeasured");
+        return std::nullopt;
     }
     STX_CHECK(readAll(table, job));
-    STX_TRY(const auto scene, writeUnmeasured(writer, std::as_const(*table).about(), options, job));
-    return Behind{scene, false};
+    return writeUnmeasured(writer, std::as_const(*table).about(), options, job);
 }
 
 /// Writes one scene of a frame and gives its number. `points`, if any, is added to.
@@ -384,7 +382,7 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
     Json scenes = Json::array(), data;
     PagePoints points;
     Bundle about;  // of the first frame, without images
-    bool leftOut = false;
+    LeftOut leftOut;
     for (std::size_t i = 0; i < line.count(); ++i) {
         job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(line.count()),
                      "writing frames");
@@ -397,9 +395,9 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
         if (!writer)
             STX_SET(writer,
                     startPage(path, options, std::as_const(*table).about().title, line.moves()));
-        STX_TRY(const Behind behind, writeBehind(*writer, table, options, job));
+        STX_TRY(const auto behind, writeBehind(*writer, table, options, leftOut, job));
         if (i == 0) about = headersOf(std::as_const(*table).about());
-        STX_CHECK(leaveCoarseOut(table, job));
+        STX_CHECK(leaveCoarseOut(table, leftOut, job));
         STX_TRY(auto views, PageViews::of(std::move(table), line.moves(), job));
         if (i == 0) {
             points.boundsKnown = about.bounds.has_value();
@@ -411,14 +409,13 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
                     writeScene(*writer, slot, views, options, i == 0 ? &points : nullptr, job));
             numbers.push_back(number);
         }
-        if (behind.scene) numbers.push_back(*behind.scene);
-        leftOut = leftOut || behind.leftOut;
+        if (behind) numbers.push_back(*behind);
         scenes.push_back(std::move(numbers));
         if (i > 0) continue;
         STX_TRY(data, dataOf(about.views, points, about.origin, line, options));
     }
     data["frames"] = std::move(scenes);
-    if (leftOut) data["without"] = "unmeasured";
+    if (!leftOut.empty()) data["without"] = fmt::format("{}", fmt::join(leftOut, ","));
     STX_CHECK(writer->finish(data));
     const auto report = reportOf(*writer, about.views.size(), points.count, line.count());
     noteSize(report, job);

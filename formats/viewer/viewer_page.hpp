@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "formats/files/files.hpp"
 #include "formats/viewer/page_scene.hpp"
@@ -21,6 +22,8 @@ struct PageOptions {
     std::string title;
     PageColours colours;
     OutputFile::Options output = {};
+    /// The options that `stx render` needs to draw what the page holds, as `--object NAME`.
+    std::vector<std::string> renderOptions = {};
 };
 
 /// What a page holds.

@@ -50,6 +50,15 @@ def main():
             drawn(browser)
             test.check(browser.ask("document.getElementById('time-text').textContent") == "0.1 s", "the slider shows a moment")
             test.check(" --time 0.1" in browser.ask("viewer.command()"), "the command names the time")
+            browser.until("location.hash.includes('time=0.1')")
+            # Where there is memory for the scenes of one moment only, those of the last that was asked for stay.
+            show(browser, test.path("film.html"), "time=0")
+            browser.ask("viewer.leastKept = 1, viewer.load0 = Scene.load.bind(Scene),"
+                        "Scene.load = async (...all) => Object.assign(await viewer.load0(...all), {texels: 1e9}), 1")
+            browser.ask("(async () => { viewer.showFrame(1), await viewer.showFrame(2); viewer.asked = true; })(), 1")
+            browser.until("viewer.asked")
+            drawn(browser)
+            test.check(browser.ask("viewer.shown.every((s) => viewer.painter.gl.isTexture(s.colour))"), "what is shown is kept")
             test.check(not browser.faults, f"no fault is logged: {browser.faults[:3]}")
         return 1 if test.failed else 0
 

@@ -222,6 +222,61 @@ def far_from_the_origin(test, browser):
     test.check(off < 1e-8, f"far from the origin the address is off by {off}")
 
 
+def addresses(test, browser):
+    """The address of a page and its command say all that the page shows, and a new address only what it says."""
+    given = ("eye=1.5,1.2,2.5&target=0,0.5,0&fov=33.3&light=-1,-2,-3&ambient=0.33&specular=2&splat=5&background=%23102030"
+             "&size=200x150&ui=off")
+    state = "JSON.stringify([viewer.camera, viewer.look(), viewer.size, document.getElementById('panel').hidden])"
+    show(browser, test.path("amphora.html"), given)
+    before = json.loads(browser.ask(state))
+    test.check(before[1]["light"]["ambient"] == 0.33 and before[1]["light"]["specular"] == 2 and before[1]["splatSize"] == 5,
+               f"values between and beyond the sliders' steps: {before[1]}")
+    length = math.sqrt(14)
+    off = max(abs(a - b / length) for a, b in zip(before[1]["light"]["direction"], (-1, -2, -3)))
+    test.check(off < 1e-6, f"the light's direction is off by {off}")
+    browser.ask("viewer.writeAddress()")
+    written = browser.ask("location.hash")[1:]
+    browser.ask("location.hash = ''")
+    browser.until("viewer.size === null && !viewer.look().light.on")
+    plain = json.loads(browser.ask(state))
+    test.check(plain[1]["splatSize"] == 1 and plain[1]["light"]["ambient"] == 0.2 and not plain[3],
+               "what an address does not say is as at the start")
+    show(browser, test.path("amphora.html"), written)
+    off = max(abs(a - b) for a, b in zip(numbers_in(before), numbers_in(json.loads(browser.ask(state)))))
+    test.check(off < 1e-6, f"a page is the same at its own address: {off}")
+    # What is up is not Y in all sets.
+    test.stx_run("convert", test.model, "-o", "z.mp4", "--views", "ring:8", "--size", "128x128", "--up", "Z")
+    test.stx_run("extract", "z.mp4", "-o", "z.html", "--refine", "off")
+    show(browser, test.path("z.html"), "eye=2,1,1&target=0,0,0.5&up=0,1,0")
+    browser.ask("viewer.writeAddress()")
+    test.check("&up=0,1,0&" in browser.ask("location.hash"), "the address says what is up where that is not the page's")
+    command = browser.ask("viewer.command()")
+    test.check(" --up=0,1,0 " in command and " --refine off " in command, command)
+    show(browser, test.path("z.html"), "eye=2,1,1&target=0,0,0.5")
+    test.check("--up" not in browser.ask("viewer.command()"), "the command leaves to stx what is its default")
+
+
+def numbers_in(value):
+    """All numbers of a JSON value, in order."""
+    if isinstance(value, (list, dict)):
+        return [n for v in (value.values() if isinstance(value, dict) else value) for n in numbers_in(v)]
+    return [value] if isinstance(value, (int, float)) else []
+
+
+def lost_device(test, browser):
+    """A device that comes back draws again."""
+    show(browser, test.path("amphora.html"), "eye=1.5,1.2,2.5&target=0,0.5,0&size=200x150&ui=off")
+    browser.picture(test.path("before.png"), 200, 150)
+    browser.ask("viewer.loses = viewer.painter.gl.getExtension('WEBGL_lose_context'), viewer.loses.loseContext(), 1")
+    browser.until("document.getElementById('message').textContent.startsWith('The device lost')")
+    browser.ask("viewer.loses.restoreContext(), 1")
+    browser.until("document.getElementById('message').textContent === ''")
+    drawn(browser)
+    browser.picture(test.path("after.png"), 200, 150)
+    found = psnr(test.stx, "before.png", "after.png", test.folder)
+    test.check(found > 60, f"after the device was lost: {found:.1f} dB")
+
+
 def single(test, browser):
     """The page of one view begins at its pose, and nothing takes the eye far from it or to where the view shows nothing."""
     test.stx_run("convert", test.model, "-o", "one.mp4", "--views", "ring:1", "--size", "128x128")
@@ -359,6 +414,8 @@ def main():
             models(test, browser, args)
             touched(test, browser)
             far_from_the_origin(test, browser)
+            addresses(test, browser)
+            lost_device(test, browser)
             single(test, browser)
             photo(test, browser)
             captured(test, browser, args)

@@ -41,7 +41,8 @@ func _ready():
 	var table = Image.new()
 	table.create(5, side * side, false, Image.FORMAT_RGBAF)
 	table.lock()
-	var lowest = 1.0
+	var ups = Vector3()
+	var backs = []
 	var page = -1
 	for r in atlas.rectangles:
 		var row = r.view - one.firstView
@@ -58,8 +59,22 @@ func _ready():
 		table.set_pixel(2, row, Color(axes.z.x, axes.z.y, axes.z.z, 255))
 		table.set_pixel(3, row, Color(r.atlasX, r.atlasY, v.fx, r.width))
 		table.set_pixel(4, row, Color(p[0], p[1], p[2], 0))
-		lowest = min(lowest, axes.z.y)
+		ups += axes.y
+		backs.append(axes.z)
 	table.unlock()
+	# Which axis is up in the pictures of all views together: +Y, unless stx convert was given another --up.
+	var axis = ups.abs().max_axis()
+	var up = Vector3()
+	up[axis] = sign(ups[axis])
+	# The shortest rotation that makes it +Y, as grids are laid out; from -Y, half a turn about X.
+	var upright = Basis()
+	if axis != Vector3.AXIS_Y:
+		upright = Basis(up.cross(Vector3.UP), PI / 2)
+	elif up.y < 0:
+		upright = Basis(Vector3.RIGHT, PI)
+	var lowest = 1.0
+	for back in backs:
+		lowest = min(lowest, back.dot(up))
 	var low = vector(one.bounds.min)
 	var high = vector(one.bounds.max)
 	# All views look at one point: where the lines of sight of a high and a low one meet.
@@ -77,6 +92,7 @@ func _ready():
 	material.set_shader_param("view_table", texture_of(table, 0))
 	material.set_shader_param("side", side)
 	material.set_shader_param("hemi", lowest > -0.1)
+	material.set_shader_param("upright", upright)
 	material.set_shader_param("centre", vector(top.position) + u * along)
 	material.set_shader_param("radius", (high - low).length() / 2)
 	var box = CubeMesh.new()

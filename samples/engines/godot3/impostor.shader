@@ -11,6 +11,7 @@ uniform sampler2D depth_texture;
 uniform sampler2D view_table;
 uniform int side;        // views along a side of the grid
 uniform bool hemi;       // hemi-octahedral, else octahedral
+uniform mat3 upright;    // turns what is up in the grid to +Y
 uniform vec3 centre;     // what all views look at
 uniform vec3 box_middle; // of the box that is drawn
 uniform float radius;
@@ -23,7 +24,7 @@ vec4 entry(int view, int k) { return texelFetch(view_table, ivec2(k, view), 0); 
 
 // Where a direction from the object lies on the grid, 0 .. side - 1 (stx convert --views).
 vec2 onGrid(vec3 direction) {
-    vec3 d = direction;
+    vec3 d = upright * direction;
     if (hemi) d.y = max(d.y, 0.0);
     d /= abs(d.x) + abs(d.y) + abs(d.z);
     vec2 p = d.xz;

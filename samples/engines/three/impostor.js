@@ -24,6 +24,19 @@ export function loadSheet(folder) {
     return sheets.get(folder);
 }
 
+// Which axis is up in the pictures of all views together: +Y, unless stx convert was given another --up.
+function upOf(ups) {
+    const sum = [0, 1, 2].map((k) => ups.reduce((all, up) => all + up[k], 0));
+    const axis = sum.map(Math.abs).indexOf(Math.max(...sum.map(Math.abs)));
+    return new THREE.Vector3().setComponent(axis, Math.sign(sum[axis]));
+}
+
+// The shortest rotation that makes it +Y, as grids are laid out; from -Y, half a turn about X.
+function uprightFrom(up) {
+    const turn = up.y < -0.5 ? new THREE.Quaternion(1, 0, 0, 0) : new THREE.Quaternion().setFromUnitVectors(up, new THREE.Vector3(0, 1, 0));
+    return new THREE.Matrix3().setFromMatrix4(new THREE.Matrix4().makeRotationFromQuaternion(turn));
+}
+
 // `folder`: the atlas' address; `name`: of an atlas of several objects, the one to draw. Throws what is wrong with it.
 export async function loadImpostor(folder, name) {
     const sheet = await loadSheet(folder), {atlas} = sheet;
@@ -51,7 +64,7 @@ export async function loadImpostor(folder, name) {
     const viewTable = new THREE.DataTexture(table, 5, side * side, THREE.RGBAFormat, THREE.FloatType);
     viewTable.needsUpdate = true;
     // The lowest views of a hemi-octahedral grid are at the horizon; of an octahedral one, below.
-    const up = new THREE.Vector3(0, 1, 0);
+    const up = upOf(views.map((v, i) => table.slice(i * 20 + 4, i * 20 + 7)));
     const lowest = Math.min(...views.map((v, i) => up.dot(new THREE.Vector3(...table.slice(i * 20 + 8, i * 20 + 11)))));
     const low = new THREE.Vector3(...object.bounds.min), high = new THREE.Vector3(...object.bounds.max);
     const size = high.clone().sub(low);
@@ -67,7 +80,7 @@ export async function loadImpostor(folder, name) {
         uniforms: {
             colourTexture: {value: await sheet.texture(of("colour"), THREE.SRGBColorSpace, THREE.LinearFilter)},
             depthTexture: {value: await sheet.texture(of("depth"), THREE.NoColorSpace, THREE.NearestFilter)},
-            viewTable: {value: viewTable}, side: {value: side}, hemi: {value: lowest > -0.1}, centre: {value: centre},
+            viewTable: {value: viewTable}, side: {value: side}, upright: {value: uprightFrom(up)}, hemi: {value: lowest > -0.1}, centre: {value: centre},
             radius: {value: size.length() / 2}, eye: {value: new THREE.Vector3()}}});
     // What gives off light has it in a texture of its own (stx convert --materials).
     const glow = of("emissive");

@@ -19,6 +19,7 @@ uniform float emissiveScale;
 #endif
 uniform int side;           // views along a side of the grid
 uniform bool hemi;          // hemi-octahedral, else octahedral
+uniform mat3 upright;       // turns what is up in the grid to +Y
 uniform vec3 centre;        // what all views look at
 uniform float radius;
 uniform vec3 eye;           // of the camera, in the object's space
@@ -30,7 +31,8 @@ const int kSteps = 32, kHalvings = 6;
 vec4 entry(int view, int k) { return texelFetch(viewTable, ivec2(k, view), 0); }
 
 // Where a direction from the object lies on the grid, 0 .. side - 1 (stx convert --views).
-vec2 onGrid(vec3 d) {
+vec2 onGrid(vec3 direction) {
+    vec3 d = upright * direction;
     if (hemi) d.y = max(d.y, 0.0);
     d /= abs(d.x) + abs(d.y) + abs(d.z);
     vec2 p = d.xz;

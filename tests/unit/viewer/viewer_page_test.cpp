@@ -577,6 +577,7 @@ TEST(ViewerPage, LeavesOutPointsThatOthersShowMoreFinely) {
         const ReadPage read = readPage(folder.path() / "page.html");
         EXPECT_EQ(read.json("scene0")["views"].size(), memory ? 8u : 9u);
         EXPECT_EQ(read.json("data")["cameras"].size(), 9u);
+        EXPECT_EQ(read.json("data").value("without", ""), memory ? "" : "coarse");
         const auto notes = job.takeNotes();
         EXPECT_EQ(std::ranges::count_if(notes,
                                         [](const std::string& note) {
