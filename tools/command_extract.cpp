@@ -327,7 +327,8 @@ void addExtract(CommandLine& line, Program& program) {
         "  stx extract photo.mp4 -o photo.jpg        and its depth in photo_depth.jpg\n\n"
         "The page is turned by dragging, by keys and by touch, under a light that moves, and "
         "plays\nfilms. Its address takes a camera: "
-        "view.html#eye=0,1,3&target=0,0,0&fov=40. Where --max-memory has no room for all views "
+        "view.html#eye=0,1,3&target=0,0,0&fov=40, time, light and more. Where --max-memory has no "
+        "room for all views "
         "at\nonce, the page has more textures: it draws the same, in other bytes.");
     auto o = std::make_shared<ExtractOptions>();
     c.option("BUNDLE", o->input, "Bundle, film or atlas").required();
