@@ -3,108 +3,19 @@
 #include <regex>
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
-#include "formats/files/deflate.hpp"
-#include "formats/images/images.hpp"
 #include "formats/viewer/page_scene.hpp"
 #include "formats/viewer/page_text.hpp"
 #include "lib/packing/packing.hpp"
-#include "lib/render/bench/analytic_scene.hpp"
 #include "tests/small_bundle.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/torus_bundle.hpp"
+#include "tests/unit/viewer/read_page.hpp"
 
 namespace {
 
 using namespace stx;
-using Json = nlohmann::json;
-
-/// Units of UTF-16, lowest byte first.
-std::u16string unitsOf(std::string_view bytes) {
-    std::u16string out(bytes.size() / 2, u'\0');
-    for (std::size_t i = 0; i < out.size(); ++i)
-        out[i] = static_cast<char16_t>(static_cast<unsigned char>(bytes[2 * i]) |
-                                       static_cast<unsigned char>(bytes[2 * i + 1]) << 8);
-    return out;
-}
-
-/// What pageText() wrote, digit by digit.
-Bytes bytesOfPageText(const std::u16string& text) {
-    std::vector<std::uint64_t> values;
-    for (std::size_t i = 0; i < text.size(); ++i) {
-        const std::uint64_t digit = text[i] - 0x2100u;
-        EXPECT_LT(digit, 46341u);
-        if (i % 2 == 0)
-            values.push_back(digit);
-        else
-            values.back() += 46341 * digit;
-    }
-    Bytes bytes(values.at(0));
-    for (std::size_t i = 0; i < bytes.size() * 8; ++i) {
-        if (values.at(1 + i / 31) >> i % 31 & 1) bytes[i / 8] |= std::byte(1u << i % 8);
-    }
-    return bytes;
-}
-
-/// What packedPageText() wrote; its size is not told, and below a megabyte.
-std::string unpackedPageText(const std::u16string& text) {
-    const Bytes packed = bytesOfPageText(text);
-    std::string out;
-    for (std::size_t size = 1; size < 1 << 20; ++size) {
-        out.resize(size);
-        if (inflateZlib(packed, std::as_writable_bytes(std::span(out)))) return out;
-    }
-    ADD_FAILURE() << "not a stream of zlib";
-    return out;
-}
-
-/// A page as a browser finds it.
-struct ReadPage {
-    std::string text;                               ///< what is ASCII of it, else '?'
-    std::map<std::string, std::u16string> scripts;  ///< by id
-
-    [[nodiscard]] Json json(const std::string& id) const {
-        return Json::parse(unpackedPageText(scripts.at(id)));
-    }
-    [[nodiscard]] DecodedImage image(int number) const {
-        const Bytes bytes = bytesOfPageText(scripts.at(fmt::format("image{}", number)));
-        auto image = decodeImage(bytes, "page", Limits());
-        EXPECT_TRUE(image);
-        return std::move(*image);
-    }
-    [[nodiscard]] int count(const std::string& name) const {
-        int n = 0;
-        while (scripts.contains(fmt::format("{}{}", name, n))) ++n;
-        return n;
-    }
-};
-
-ReadPage readPage(const std::filesystem::path& path) {
-    const auto bytes = readFile(path, Limits());
-    EXPECT_TRUE(bytes);
-    ReadPage page;
-    const std::u16string units =
-        unitsOf({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
-    EXPECT_EQ(units[0], u'\ufeff') << "no mark of UTF-16";
-    for (const char16_t unit : units) page.text += unit < 128 ? static_cast<char>(unit) : '?';
-    const std::string begin = "<script type=\"", id = "\" id=\"", end = "</script>";
-    for (std::size_t at = 0; (at = page.text.find(begin, at)) != std::string::npos;) {
-        const std::size_t name = page.text.find(id, at) + id.size();
-        const std::size_t close = page.text.find("\">", name);
-        const std::size_t last = page.text.find(end, close);
-        page.scripts[page.text.substr(name, close - name)] =
-            units.substr(close + 2, last - close - 2);
-        at = last;
-    }
-    return page;
-}
-
-Result<PageReport> write(Bundle bundle, const std::filesystem::path& path, Job& job,
-                         const PageOptions& options = {"bundle.mp4", {}, {}, {}}) {
-    const auto still = sequenceOf(std::move(bundle));
-    return writeViewerPage(*still, path, options, job);
-}
+using namespace stx::pages;
 
 TEST(ViewerPage, IsHardlyLargerThanItsImages) {
     const TemporaryFolder folder;
@@ -275,63 +186,6 @@ TEST(ViewerPage, WritesEachPictureOfAFilmOnce) {
     for (const Json& r : scene["rectangles"]) EXPECT_EQ(r[0], r[1]) << "each has its own page";
 }
 
-/// Views that are read when they are asked for.
-class OnDemand : public Sequence {
-  public:
-    explicit OnDemand(Bundle bundle) : bundle_(std::move(bundle)) {}
-    Result<Bundle> frame(std::size_t, Job&) override { return bundle_; }
-    Result<std::unique_ptr<ViewTable>> views(std::size_t, Job&) override {
-        class Table : public ViewTable {
-          public:
-            explicit Table(const Bundle& all)
-                : ViewTable(headersOf(all),
-                            std::vector(all.views.size(), ViewImageKinds::of(all.views[0]))),
-                  all_(all) {}
-            Result<std::shared_ptr<const ReferenceView>> make(std::size_t index,
-                                                              Job&) const override {
-                return std::make_shared<const ReferenceView>(all_.views[index]);
-            }
-            const Bundle& all_;
-        };
-        return std::make_unique<Table>(bundle_);
-    }
-
-  private:
-    Bundle bundle_;
-};
-
-TEST(ViewerPage, HoldsAsManyViewsAsThereIsMemoryFor) {
-    const TemporaryFolder folder;
-    Job job;
-    Bundle bundle = smallBundle(7, 16, false, false);
-    bundle.views[3].background = true;
-    OnDemand views(bundle);
-    const PageOptions options{"a.exr", {}, {}, {}};
-    const auto whole = writeViewerPage(views, folder.path() / "whole.html", options, job);
-    // At 44 bytes a pixel the views take from 17 to 85 kB: four of the six, and the other two.
-    job.limits.maxMemoryBytes = 160'000;
-    const auto parts = writeViewerPage(views, folder.path() / "parts.html", options, job);
-    ASSERT_TRUE(whole && parts) << parts.error().text();
-    EXPECT_EQ(parts->points, whole->points);
-    EXPECT_EQ(parts->views, 7u);
-    const ReadPage one = readPage(folder.path() / "whole.html"),
-                   two = readPage(folder.path() / "parts.html");
-    Json of = two.json("data");
-    EXPECT_EQ(of["without"], "coarse");
-    of.erase("without");
-    EXPECT_EQ(one.json("data"), of);
-    EXPECT_EQ(one.json("scene0")["views"], two.json("scene0")["views"]);
-    EXPECT_EQ(one.json("scene0")["pages"].size(), 1u);
-    EXPECT_EQ(two.json("scene0")["pages"].size(), 2u);
-    for (const Json& r : two.json("scene0")["rectangles"]) EXPECT_EQ(r[0].get<int>() / 4, r[1]);
-    EXPECT_EQ(one.json("scene1")["views"], two.json("scene1")["views"]) << "behind them";
-    job.limits.maxMemoryBytes = 60'000;
-    const auto none = writeViewerPage(views, folder.path() / "none.html", options, job);
-    ASSERT_FALSE(none);
-    EXPECT_EQ(none.error().code, ErrorCode::invalidInput);
-    EXPECT_FALSE(std::filesystem::exists(folder.path() / "none.html"));
-}
-
 TEST(ViewerPage, TakesAnAtlasAsItIs) {
     const TemporaryFolder folder;
     Job job;
@@ -494,108 +348,6 @@ TEST(ViewerPage, SaysThatItLeavesMaterialsOut) {
     EXPECT_NE(ofViews[0].find("emissive"), std::string::npos) << ofViews[0];
     ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "b.html", {"atlas", {}, {}, {}}, job));
     EXPECT_EQ(job.takeNotes(), ofViews);
-}
-
-/// A wall that two views see, who lack the depth of a part of it.
-Bundle wallWithoutSomeDepth() {
-    Bundle bundle = smallBundle(2, 16, false, false);
-    for (ReferenceView& view : bundle.views) {
-        view.noDepth = NoDepth::unknown;
-        const int width = view.camera.width, height = view.camera.height;
-        view.camera.orthographic = false;
-        view.texture = Rgba8Image(width, height, glm::u8vec4(90, 120, 150, 255));
-        view.depth =
-            Image<float>(width, height, static_cast<float>(0.5 * (view.nearPlane + view.farPlane)));
-        for (int y = 8; y < 15; ++y)
-            for (int x = 8; x < 15; ++x) view.depth.at(x, y) = kNoDepth;
-    }
-    return bundle;
-}
-
-TEST(ViewerPage, HoldsColoursWithoutDepthBehindAllElse) {
-    const TemporaryFolder folder;
-    Job job;
-    Bundle bundle = wallWithoutSomeDepth();
-    ASSERT_TRUE(write(bundle, folder.path() / "a.html", job));
-    const ReadPage page = readPage(folder.path() / "a.html");
-    ASSERT_EQ(page.json("data")["frames"][0].size(), 2u);
-    EXPECT_FALSE(page.json("data").contains("without"));
-    const int behind = page.json("data")["frames"][0][1];
-    const Json scene = page.json(fmt::format("scene{}", behind));
-    ASSERT_GE(scene["views"].size(), 2u);
-    for (const Json& view : scene["views"]) EXPECT_EQ(view["noDepth"], "unknown");
-    // An atlas of the same holds them, too.
-    const auto atlas = pack(bundle, {}, job);
-    ASSERT_TRUE(atlas);
-    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "b.html", {"atlas", {}, {}, {}}, job));
-    EXPECT_EQ(readPage(folder.path() / "b.html").json("data")["frames"][0].size(), 2u);
-    // Where nothing is there is nothing to hold.
-    for (ReferenceView& view : bundle.views) view.noDepth = NoDepth::empty;
-    ASSERT_TRUE(write(bundle, folder.path() / "c.html", job));
-    EXPECT_EQ(readPage(folder.path() / "c.html").json("data")["frames"][0].size(), 1u);
-}
-
-TEST(ViewerPage, SaysThatColoursWithoutDepthHaveNoRoom) {
-    const TemporaryFolder folder;
-    Job job;
-    OnDemand views(wallWithoutSomeDepth());
-    // The page needs 44 to 55 bytes for each of 963 pixels, with what is behind 60.
-    job.limits.maxMemoryBytes = 54'000;
-    const auto report =
-        writeViewerPage(views, folder.path() / "a.html", {"a.exr", {}, {}, {}}, job);
-    ASSERT_TRUE(report) << report.error().text();
-    const auto notes = job.takeNotes();
-    ASSERT_EQ(notes.size(), 1u);
-    EXPECT_NE(notes[0].find("colours without depth are not on the page"), std::string::npos);
-    const Json data = readPage(folder.path() / "a.html").json("data");
-    EXPECT_EQ(data["frames"][0].size(), 1u);
-    EXPECT_EQ(data["without"], "unmeasured") << "the command draws what the page shows";
-}
-
-/// Their splats stick out beyond the outlines that finer views know.
-TEST(ViewerPage, LeavesOutPointsThatOthersShowMoreFinely) {
-    const TemporaryFolder folder;
-    Bundle mixed;
-    const auto viewOf = [](double number, int side) {
-        return viewOfAnalyticScene(
-            AnalyticScene::object,
-            analyticCamera(AnalyticScene::object, number, 8).resized(side, side), 2);
-    };
-    for (int i = 0; i < 8; ++i) mixed.views.push_back(viewOf(i, 96));
-    const Bundle fine = mixed;
-    mixed.views.push_back(viewOf(2.2, 12));
-    const std::int64_t points = fine.pointCount();
-    ASSERT_GT(mixed.pointCount(), points);
-    for (const bool memory : {true, false}) {
-        Job job;
-        OnDemand views(mixed);
-        // A view at a time has room.
-        if (!memory) job.limits.maxMemoryBytes = 1'000'000;
-        const auto page =
-            writeViewerPage(views, folder.path() / "page.html", {"a.exr", {}, {}, {}}, job);
-        ASSERT_TRUE(page) << page.error().text();
-        EXPECT_EQ(page->points, memory ? points : mixed.pointCount());
-        EXPECT_EQ(page->views, 9u);
-        // Where the object is not, says a view that is drawn from: such a coarse one may not.
-        const ReadPage read = readPage(folder.path() / "page.html");
-        EXPECT_EQ(read.json("scene0")["views"].size(), memory ? 8u : 9u);
-        EXPECT_EQ(read.json("data")["cameras"].size(), 9u);
-        EXPECT_EQ(read.json("data").value("without", ""), memory ? "" : "coarse");
-        const auto notes = job.takeNotes();
-        EXPECT_EQ(std::ranges::count_if(notes,
-                                        [](const std::string& note) {
-                                            return note.find("twice as finely") !=
-                                                   std::string::npos;
-                                        }),
-                  memory ? 0 : 1);
-    }
-    Job job;
-    const auto atlas = pack(mixed, {}, job);
-    ASSERT_TRUE(atlas);
-    const auto page =
-        writeViewerPage(*atlas, folder.path() / "atlas.html", {"a.exr", {}, {}, {}}, job);
-    ASSERT_TRUE(page) << page.error().text();
-    EXPECT_EQ(page->points, points);
 }
 
 TEST(ViewerPage, LeavesNothingWhenItFails) {
