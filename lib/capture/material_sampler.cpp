@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lib/base/float4.hpp"
 #include "lib/base/rounding.hpp"
 #include "lib/model/srgb8.hpp"
 #include "lib/model/texture.hpp"
@@ -37,14 +38,6 @@ float reduced(float v, MeshTexture::Wrap wrap) {
     if (!std::isfinite(v)) return 0.0f;
     if (wrap == MeshTexture::Wrap::clamp) return std::clamp(v, 0.0f, 1.0f);
     return v - 2.0f * std::floor(v * 0.5f);
-}
-
-/// Four channels at once. GCC and clang make vector instructions of it on every processor.
-using Float4 = float __attribute__((vector_size(16)));
-
-Float4 floatsOf(glm::u8vec4 p) {
-    using Int4 = std::int32_t __attribute__((vector_size(16)));
-    return __builtin_convertvector((Int4{p.r, p.g, p.b, p.a}), Float4);
 }
 
 }  // namespace

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+
+#include "lib/base/float4.hpp"
 
 namespace stx {
 
@@ -19,50 +22,64 @@ float linearFromSrgb(float coded) {
 
 namespace {
 
+constexpr Float4 kNothing = {};
+
 /// An image of half the size from premultiplied colours at(x, y) of a w x h image.
 template <class At>
 Image<glm::vec4> halved(int w, int h, const At& at) {
     Image<glm::vec4> half((w + 1) / 2, (h + 1) / 2);
     for (int y = 0; y < half.height(); ++y) {
         for (int x = 0; x < half.width(); ++x) {
-            glm::vec4 sum(0.0f);
+            Float4 sum = kNothing;
             for (int k = 0; k < 4; ++k) {
                 const int sx = 2 * x + (k & 1), sy = 2 * y + (k >> 1);
                 if (sx < w && sy < h) sum += at(sx, sy);
             }
-            half.at(x, y) = sum.a > 1.0f ? sum / sum.a : sum;
+            half.at(x, y) = vectorOf(sum[3] > 1.0f ? sum / sum[3] : sum);
         }
     }
     return half;
 }
 
-/// The colour that a pixel gets from the next coarser level, alpha 1; 0 when there is none.
+/// The colours that pixels of a row get from the next coarser level, alpha 1; 0 when there is none.
 /// Bilinear; its texel centres sit between two of ours, a quarter of a texel from the nearer one.
-glm::vec4 fromHalf(const Image<glm::vec4>& half, int x, int y) {
-    const int x0 = (x + 1) / 2 - 1, y0 = (y + 1) / 2 - 1;
-    const float fx = (x & 1) ? 0.25f : 0.75f, fy = (y & 1) ? 0.25f : 0.75f;
-    glm::vec4 sum(0.0f);
-    for (int k = 0; k < 4; ++k) {
-        const int sx = std::clamp(x0 + (k & 1), 0, half.width() - 1),
-                  sy = std::clamp(y0 + (k >> 1), 0, half.height() - 1);
-        const float wx = (k & 1) ? fx : 1.0f - fx;
-        const float wy = (k >> 1) ? fy : 1.0f - fy;
-        sum += half.at(sx, sy) * (wx * wy);
+class FromHalf {
+  public:
+    FromHalf(const Image<glm::vec4>& half, int y)
+        : last_(half.width() - 1),
+          above_(half.row(std::clamp((y + 1) / 2 - 1, 0, half.height() - 1))),
+          below_(half.row(std::clamp((y + 1) / 2, 0, half.height() - 1))),
+          along_((y & 1) ? 0.25f : 0.75f) {}
+
+    [[nodiscard]] Float4 at(int x) const {
+        const int x0 = std::clamp((x + 1) / 2 - 1, 0, last_),
+                  x1 = std::clamp((x + 1) / 2, 0, last_);
+        const float fx = (x & 1) ? 0.25f : 0.75f;
+        const auto tap = [](const glm::vec4& c, float weight) { return floatsOf(c) * weight; };
+        const Float4 sum = kNothing + tap(above_[x0], (1.0f - fx) * (1.0f - along_)) +
+                           tap(above_[x1], fx * (1.0f - along_)) +
+                           tap(below_[x0], (1.0f - fx) * along_) + tap(below_[x1], fx * along_);
+        return sum[3] > 0.0f ? sum / sum[3] : kNothing;
     }
-    return sum.a > 0.0f ? sum / sum.a : glm::vec4(0.0f);
-}
+
+  private:
+    int last_;
+    std::span<const glm::vec4> above_, below_;
+    float along_;
+};
 
 /// Pull-push on alpha-weighted colour: each level halves the image until one texel is left, then
 /// the holes are filled on the way back up. Linear in the pixels, independent of hole shapes.
 void fillHoles(Image<glm::vec4>& premultiplied) {
     if (premultiplied.width() <= 1 && premultiplied.height() <= 1) return;
     auto half = halved(premultiplied.width(), premultiplied.height(),
-                       [&](int x, int y) { return premultiplied.at(x, y); });
+                       [&](int x, int y) { return floatsOf(premultiplied.at(x, y)); });
     fillHoles(half);
     for (int y = 0; y < premultiplied.height(); ++y) {
+        const FromHalf coarser(half, y);
         for (int x = 0; x < premultiplied.width(); ++x) {
             auto& p = premultiplied.at(x, y);
-            if (!(p.a > 0.0f)) p = fromHalf(half, x, y);
+            if (!(p.a > 0.0f)) p = vectorOf(coarser.at(x));
         }
     }
 }
@@ -79,26 +96,33 @@ void bleedColour(Texture& texture) {
                            [&](int x, int y) { return premultiplied(image.at(x, y)); });
         fillHoles(half);
         for (int y = 0; y < image.height(); ++y) {
+            const FromHalf coarser(half, y);
             for (int x = 0; x < image.width(); ++x) {
                 auto& p = image.at(x, y);
                 if (p.a > 0) continue;
-                const glm::vec4 filled = fromHalf(half, x, y);
-                if (filled.a > 0.0f) p = coded(filled / filled.a);
+                const Float4 filled = coarser.at(x);
+                if (filled[3] > 0.0f) p = coded(filled / filled[3]);
             }
         }
     };
-    const auto byAlpha = [](glm::vec4 c) {
-        return c.a > 0.0f ? glm::vec4(glm::vec3(c) * c.a, c.a) : glm::vec4(0.0f);
+    const auto byAlpha = [](Float4 c) {
+        if (!(c[3] > 0.0f)) return kNothing;
+        return c * Float4{c[3], c[3], c[3], 1.0f};
     };
     if (auto* bytes = texture.rgba8())
         bleed(
-            *bytes, [&](glm::u8vec4 p) { return byAlpha(glm::vec4(p) * (1.0f / 255.0f)); },
-            [](glm::vec4 c) {
-                return glm::u8vec4(glm::clamp(glm::vec3(c), 0.0f, 1.0f) * 255.0f + 0.5f, 0);
+            *bytes,
+            [&](glm::u8vec4 p) {
+                return p.a > 0 ? byAlpha(floatsOf(p) * (1.0f / 255.0f)) : kNothing;
+            },
+            [](Float4 c) {
+                const glm::vec3 colour = vectorOf(c);
+                return glm::u8vec4(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f, 0);
             });
     else
-        bleed(*texture.rgbaFloat(), byAlpha,
-              [](glm::vec4 c) { return glm::vec4(glm::vec3(c), 0.0f); });
+        bleed(
+            *texture.rgbaFloat(), [&](const glm::vec4& c) { return byAlpha(floatsOf(c)); },
+            [](Float4 c) { return glm::vec4(c[0], c[1], c[2], 0.0f); });
 }
 
 }  // namespace stx
