@@ -1,12 +1,15 @@
 #include "formats/meshes/alpha_map.hpp"
 
 #include <algorithm>
+#include <string_view>
 
 #include "lib/capture/material_sampler.hpp"
 
 namespace stx {
 
-int textureWithAlpha(std::vector<MeshTexture>& textures, int base, int alpha) {
+int textureWithAlpha(std::vector<MeshTexture>& textures, int base, int alpha, char channel) {
+    constexpr std::string_view kChannels = "rgbm";
+    const auto plain = kChannels.find(channel);
     const auto& map = textures[alpha];
     const auto& texels = map.pixels.pixels();
     const bool ownAlpha =
@@ -17,7 +20,10 @@ int textureWithAlpha(std::vector<MeshTexture>& textures, int base, int alpha) {
             const glm::vec2 uv((x + 0.5f) / out.pixels.width(), (y + 0.5f) / out.pixels.height());
             const auto c = sampleTexture(map, uv);
             // Rec. 709 weights of the coded values: an alpha map is data, not light.
-            const float value = ownAlpha ? c.a : 0.2126f * c.r + 0.7152f * c.g + 0.0722f * c.b;
+            const float grey = 0.2126f * c.r + 0.7152f * c.g + 0.0722f * c.b;
+            const float value = plain < kChannels.size()     ? c[static_cast<int>(plain)]
+                                : ownAlpha && channel != 'l' ? c.a
+                                                             : grey;
             auto& pixel = out.pixels.at(x, y);
             if (base < 0) pixel = glm::u8vec4(255);
             pixel.a = static_cast<std::uint8_t>(std::clamp(value, 0.0f, 1.0f) * 255.0f + 0.5f);

@@ -54,10 +54,10 @@ class SceneConverter {
           format_(format),
           files_(files),
           builder_(files.job()),
+          mtl_(side.materials()),
           materialFolder_(side.materialFolder()) {
-        for (const auto& text : side.texts()) scanMtl(text, mtl_);
         saysUndefined_ = format == AssimpFormat::obj && !files.replacesColour() &&
-                         (side.missing().empty() || !side.texts().empty());
+                         (side.missing().empty() || side.hasMaterialFile());
         builder_.setOrigin(origin);
     }
 
@@ -121,16 +121,17 @@ class SceneConverter {
             m.baseColour.a = opacity;
             m.alpha = Material::Alpha::blend;
         }
-        for (const auto& option : mtl.droppedOptions)
-            files_.job().note(fmt::format("material '{}': option {} is dropped", m.name, option));
+        for (const auto& what : mtl.dropped)
+            files_.job().note(fmt::format("material '{}': {} is dropped", m.name, what));
 
+        const bool ownAlpha = !mtl.alphaMap.empty() && mtl.alphaMap == mtl.diffuseMap &&
+                              (mtl.alphaChannel == 0 || mtl.alphaChannel == 'm');
         if (hasMap && !files_.replacesColour()) {
             STX_TRY(m.baseColourTexture, texture(source, Use::diffuse));
-            if (!mtl.alphaMap.empty() && mtl.alphaMap == mtl.diffuseMap)
-                m.alpha = Material::Alpha::blend;
+            if (ownAlpha) m.alpha = Material::Alpha::blend;
         }
-        if (!mtl.alphaMap.empty() && mtl.alphaMap != mtl.diffuseMap && !files_.replacesColour())
-            STX_CHECK(addAlphaMap(source, m));
+        if (!mtl.alphaMap.empty() && !ownAlpha && !files_.replacesColour())
+            STX_CHECK(addAlphaMap(source, mtl.alphaChannel, m));
         STX_CHECK(addEmission(source, mtl, scene, m));
         if (textureOf(source, Use::normals))
             STX_SET(m.normalTexture, texture(source, Use::normals));
@@ -173,14 +174,14 @@ class SceneConverter {
     }
 
     /// map_d becomes the alpha of the base colour texture.
-    Result<void> addAlphaMap(const ForeignScene::Material& source, Material& m) {
+    Result<void> addAlphaMap(const ForeignScene::Material& source, char channel, Material& m) {
         if (!textureOf(source, Use::opacity)) return {};
         STX_TRY(const int map, texture(source, Use::opacity));
         if (map < 0) return {};
         auto& textures = builder_.textures();
         const auto& like = textures[m.baseColourTexture >= 0 ? m.baseColourTexture : map];
         STX_CHECK(builder_.charge(like.pixels.count(), sizeof(glm::u8vec4), "the alpha maps"));
-        m.baseColourTexture = textureWithAlpha(textures, m.baseColourTexture, map);
+        m.baseColourTexture = textureWithAlpha(textures, m.baseColourTexture, map, channel);
         m.alpha = Material::Alpha::blend;
         return {};
     }
@@ -377,7 +378,7 @@ class SceneConverter {
     AssimpFormat format_;
     ModelFiles& files_;
     MeshBuilder builder_;
-    std::map<std::string, MtlMaterial> mtl_;
+    const std::map<std::string, MtlMaterial>& mtl_;
     std::vector<MtlMaterial> mtlOf_;  ///< of each material
     std::vector<glm::dmat4> worldFromNode_;
     std::string materialFolder_;
@@ -466,7 +467,7 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         STX_TRY(auto scene, hear(*process, format, side, limits));
         if (format == AssimpFormat::stl && scene.meshes.size() == 1)
             readStlColours(bytes, scene.meshes[0].colours);
-        if (!side.missing().empty() && side.texts().empty())
+        if (!side.missing().empty() && !side.hasMaterialFile())
             files.job().note(
                 fmt::format("material file {}; its materials have no colour", side.missing()));
         if (!collada.wrap.empty())
