@@ -1,6 +1,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <limits>
 
 #include "formats/meshes/text_encoding.hpp"
 #include "formats/meshes/triangulate.hpp"
@@ -28,10 +29,7 @@ TEST(IsMesh, ByBytesThenByEnding) {
     EXPECT_FALSE(isMesh("-", bytesOf("plywood")));
 }
 
-TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
-    // A comb with three teeth, drawn in a slanted plane.
-    const std::vector<glm::vec2> outline = {{0, 0}, {6, 0}, {6, 4}, {5, 1}, {4, 4},
-                                            {3, 1}, {2, 4}, {1, 1}, {0, 4}};
+void expectTriangulated(const std::vector<glm::dvec2>& outline) {
     for (const bool reversed : {false, true}) {
         std::vector<glm::dvec3> corners;
         for (const auto& p : outline) corners.emplace_back(p.x, p.y * 0.5, p.y + p.x);
@@ -50,6 +48,28 @@ TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
     }
 }
 
+TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
+    // A comb with three teeth, drawn in a slanted plane.
+    expectTriangulated({{0, 0}, {6, 0}, {6, 4}, {5, 1}, {4, 4}, {3, 1}, {2, 4}, {1, 1}, {0, 4}});
+}
+
+TEST(Triangulate, SoDoThoseOfManyCorners) {
+    std::vector<glm::dvec2> comb = {{0, 0}, {1, 0}}, arc;
+    constexpr int kTeeth = 10000, kSteps = 3000;
+    for (int i = kTeeth; i >= 0; --i) {
+        comb.emplace_back((i + 0.5) / (kTeeth + 1), 1);
+        if (i > 0) comb.emplace_back(i / (kTeeth + 1.0), 0.25);
+    }
+    expectTriangulated(comb);
+    // The letter C.
+    for (int i = 0; i < 2 * kSteps; ++i) {
+        const bool outer = i < kSteps;
+        const double angle = (outer ? i : 2 * kSteps - 1 - i) * 5.0 / kSteps;
+        arc.push_back(glm::dvec2(std::cos(angle), std::sin(angle)) * (outer ? 1.5 : 0.9));
+    }
+    expectTriangulated(arc);
+}
+
 TEST(Triangulate, NonsenseStillEnds) {
     std::vector<glm::dvec3> corners(50, glm::dvec3(1));
     std::vector<glm::uvec3> triangles;
@@ -59,6 +79,11 @@ TEST(Triangulate, NonsenseStillEnds) {
     corners = {{0, 0, 0}, {1, 1, 0}, {1, 0, 0}, {0, 1, 0}};  // a bow tie
     triangulate(corners, triangles);
     EXPECT_EQ(triangles.size(), 2u);
+    triangles.clear();
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN(), kFar = HUGE_VAL;
+    corners = {{0, 0, 0}, {1, kNone, 0}, {kFar, 0, 0}, {0, -kFar, 0}, {0.5, 0, 1e308}};
+    triangulate(corners, triangles);
+    EXPECT_EQ(triangles.size(), 3u);
 }
 
 TEST(TextEncoding, MarkedTextBecomesUtf8) {
