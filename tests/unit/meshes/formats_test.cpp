@@ -245,6 +245,63 @@ TEST(Clouds, PointsThatAreNowhereAreSkippedAndCounted) {
     EXPECT_EQ(readGoodText(gltf.text(), "a.gltf").mesh.points.size(), 2u);
 }
 
+/// The colour of each point, as sRGB.
+std::vector<glm::ivec3> pointColours(const ReadModel& model) {
+    std::vector<glm::ivec3> out;
+    for (const auto p : model.mesh.points) {
+        glm::ivec3 c(255);
+        if (!model.mesh.colours.empty())
+            for (int k = 0; k < 3; ++k)
+                c[k] =
+                    static_cast<int>(std::lround(srgbFromLinear(model.mesh.colours[p][k]) * 255));
+        out.push_back(c);
+    }
+    return out;
+}
+
+TEST(Clouds, PointsHaveTheColourOfTheirMaterial) {
+    using Colours = std::vector<glm::ivec3>;
+    const glm::ivec3 red(255, 0, 0), grey(188);
+    TemporaryFolder folder;
+    write(folder / "a.mtl", "newmtl red\nKd 1 0 0\n");
+    write(folder / "a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nusemtl red\np 1 2\n");
+    EXPECT_EQ(pointColours(readGood(folder / "a.obj")), (Colours{red, red}));
+
+    GltfText gltf;
+    const int position = gltf.accessor(std::vector<float>{0, 0, 0, 1, 0, 0}, 5126, "VEC3", 2);
+    const int colour = gltf.accessor(std::vector<float>{1, 1, 1, 0, 1, 1}, 5126, "VEC3", 2);
+    gltf.root["materials"] = {{{"pbrMetallicRoughness", {{"baseColorFactor", {1, 0, 0, 1}}}}},
+                              {{"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}}},
+                               {"emissiveFactor", {1, 0, 0}}}};
+    auto& primitives = gltf.root["meshes"][0]["primitives"];
+    primitives.push_back({{"attributes", {{"POSITION", position}, {"COLOR_0", colour}}},
+                          {"mode", 0},
+                          {"material", 0}});
+    primitives.push_back({{"attributes", {{"POSITION", position}}}, {"mode", 0}, {"material", 1}});
+    EXPECT_EQ(pointColours(readGoodText(gltf.text(), "a.gltf")),
+              (Colours{red, glm::ivec3(0), red, red}));
+
+    const auto plain = readGoodText(
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty "
+        "float z\nend_header\n0 0 0\n",
+        "a.ply");
+    EXPECT_EQ(pointColours(plain), Colours{grey});
+    EXPECT_TRUE(plain.hasNote("it is drawn in plain grey"));
+    EXPECT_EQ(pointColours(readGoodText("v 0 0 0\nv 1 0 0\n", "a.obj")), (Colours{grey, grey}));
+}
+
+TEST(Clouds, ATextureOfPointsIsSaidToBeDropped) {
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.addTexture();
+    gltf.root["materials"] = {
+        {{"name", "a"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+    gltf.primitive()["material"] = 0;
+    gltf.primitive()["mode"] = 0;
+    EXPECT_TRUE(readGoodText(gltf.text(), "a.gltf")
+                    .hasNote("the texture of material 'a' is not drawn on points"));
+}
+
 class WritePoints : public testing::Test {
   protected:
     WritePoints() {
