@@ -221,6 +221,35 @@ TEST(Ply, FaceColoursAndStrips) {
     }
 }
 
+TEST(Ply, FacesMayComeBeforeTheirVertices) {
+    const std::string faces =
+        "ply\nformat ascii 1.0\nelement face 2\nproperty list uchar int vertex_indices\nelement "
+        "vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty float s\n"
+        "property float t\nend_header\n";
+    const std::string vertices = "0 0 0 0 0\n1 0 0 0.5 0\n1 1 0 1 1\n0 1 0 0 1\n";
+    const auto model = readGoodText(faces + "3 0 1 2\n3 0 2 3\n" + vertices, "a.ply").mesh;
+    ASSERT_EQ(model.triangles.size(), 2u);
+    EXPECT_EQ(model.positions[model.triangles[1].z], glm::vec3(0, 1, 0));
+    EXPECT_EQ(model.uvs.at(model.triangles[0].y), glm::vec2(0.5f, 1));
+    EXPECT_NE(readBadText(faces + "3 0 1 4\n3 0 2 3\n" + vertices, "a.ply")
+                  .text()
+                  .find("uses vertex 4, but there are only 4 vertices"),
+              std::string::npos);
+}
+
+TEST(Ply, ColoursOfFacesBesideThoseOfVerticesAreSaidToBeDropped) {
+    const auto model = readGoodText(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+        "float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n"
+        "property list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\n"
+        "property uchar blue\nend_header\n0 0 0 0 0 255\n1 0 0 0 0 255\n1 1 0 0 0 255\n"
+        "3 0 1 2 255 0 0\n",
+        "a.ply");
+    EXPECT_EQ(model.mesh.colours.at(0), glm::vec4(0, 0, 1, 1));
+    EXPECT_TRUE(
+        model.hasNote("dropped: the colours of PLY faces; those of the vertices are drawn"));
+}
+
 TEST(Clouds, PointsThatAreNowhereAreSkippedAndCounted) {
     const std::string header =
         "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty "
