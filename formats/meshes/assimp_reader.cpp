@@ -441,9 +441,17 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
     if (format == AssimpFormat::fbx) STX_CHECK(checkFbxClaims(bytes, limits));
     if (format == AssimpFormat::stl) STX_CHECK(checkStlEnd(bytes));
     try {
-        std::optional<Bytes> zeros;
-        if (format == AssimpFormat::obj) zeros = withLeadingZeros(bytes);
-        if (zeros) bytes = *zeros;
+        std::optional<Bytes> usual;
+        if (format == AssimpFormat::obj) usual = withLeadingZeros(bytes);
+        if (format == AssimpFormat::stl) {
+            usual = lowerCaseStl(bytes);
+            if (const auto behind = bytesBehindBinaryStl(bytes); behind > 0) {
+                files.job().note(
+                    fmt::format("dropped: what is behind the last facet ({} bytes)", behind));
+                bytes = bytes.first(bytes.size() - behind);
+            }
+        }
+        if (usual) bytes = *usual;
         PlainCollada collada;
         if (format == AssimpFormat::dae) {
             STX_SET(collada, plainCollada(bytes));

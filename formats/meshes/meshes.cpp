@@ -57,7 +57,7 @@ Format formatOfEnding(const std::filesystem::path& path) {
 
 /// For files without a telling ending: JSON with an asset, ASCII STL.
 Format formatOfText(ByteSpan head) {
-    const auto text = textOf(head);
+    const auto text = lowerCase(std::string(textOf(head)));
     const auto first = text.find_first_not_of(" \t\r\n");
     if (first != std::string_view::npos && text[first] == '{' &&
         text.find("\"asset\"") != std::string_view::npos)

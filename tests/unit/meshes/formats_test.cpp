@@ -140,8 +140,27 @@ TEST(Stl, ColoursOfFacets) {
     EXPECT_EQ(stlColours(magics, {0, 0}), (Colours{green, green}));
     EXPECT_EQ(stlColours("viscam", {0xfc00, 0x801f, 0x8000 | 8 | 16 << 5 | 24 << 10}),
               (Colours{red, blue, glm::ivec3(197, 132, 66)}));
-    EXPECT_EQ(stlColours("viscam", {0xfc00, 0}), (Colours{red, glm::ivec3(153)}));
+    EXPECT_EQ(stlColours("viscam", {0xfc00, 0}), (Colours{red, plain}));
     EXPECT_EQ(stlColours("plain", {0, 0x7fff}), (Colours{plain, plain}));
+}
+
+TEST(Stl, BytesBehindTheLastFacetAreSaidToBeDropped) {
+    std::string stl(80 + 4 + 50, '\0');
+    stl[80] = 1;
+    const float corners[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    std::memcpy(stl.data() + 84 + 12, corners, sizeof(corners));
+    EXPECT_FALSE(readGoodText(stl, "a.stl").hasNote("facet"));
+    const auto more = readGoodText(stl + "xy", "a.stl");
+    EXPECT_EQ(more.mesh.triangles.size(), 1u);
+    EXPECT_TRUE(more.hasNote("dropped: what is behind the last facet (2 bytes)"));
+}
+
+TEST(Stl, KeywordsMayBeInUpperCase) {
+    const std::string text =
+        "SOLID X\nFACET NORMAL 0 0 1\n OUTER LOOP\n  VERTEX -.5 -.5 0\n  VERTEX 5E-1 -.5 0\n  "
+        "VERTEX .5 .5 0\n ENDLOOP\nENDFACET\nENDSOLID X\n";
+    EXPECT_EQ(readGoodText(text, "a.stl").mesh.triangles.size(), 1u);
+    EXPECT_EQ(readGoodText(text, "-").mesh.bounds().max, glm::dvec3(0.5, 0.5, 0));
 }
 
 TEST(Obj, VRunsDownInMeshAndKdIsSrgb) {
