@@ -7,6 +7,7 @@
 #include "formats/meshes/foreign_scene.hpp"
 #include "formats/meshes/mesh_builder.hpp"
 #include "formats/meshes/mtl_notes.hpp"
+#include "formats/meshes/obj_faces.hpp"
 #include "formats/meshes/readers.hpp"
 #include "formats/meshes/scene_claims.hpp"
 #include "formats/meshes/side_files.hpp"
@@ -49,13 +50,14 @@ constexpr std::uint64_t kSanitizerBytes = 0;
 class SceneConverter {
   public:
     SceneConverter(const ForeignScene& scene, AssimpFormat format, ModelFiles& files,
-                   const SideFiles& side, glm::dvec3 origin)
+                   const SideFiles& side, glm::dvec3 origin, std::set<std::string> bare)
         : scene_(scene),
           format_(format),
           files_(files),
           builder_(files.job()),
           mtl_(side.materials()),
-          materialFolder_(side.materialFolder()) {
+          materialFolder_(side.materialFolder()),
+          bare_(std::move(bare)) {
         saysUndefined_ = format == AssimpFormat::obj && !files.replacesColour() &&
                          (side.missing().empty() || side.hasMaterialFile());
         builder_.setOrigin(origin);
@@ -142,6 +144,12 @@ class SceneConverter {
                 files_.job().note(fmt::format("material '{}': its {} is dropped", m.name, label));
         }
         noteUvSets(source);
+        if (bare_.contains(m.name) &&
+            std::ranges::any_of(source.textures, [](const auto& t) { return t.has_value(); }))
+            files_.job().note(fmt::format(
+                "material '{}': some of its faces have no texture coordinates; they have the "
+                "colour of its texture at 0 0",
+                m.name));
         builder_.materials().push_back(std::move(m));
         mtlOf_.push_back(mtl);
         return {};
@@ -382,6 +390,7 @@ class SceneConverter {
     std::vector<MtlMaterial> mtlOf_;  ///< of each material
     std::vector<glm::dmat4> worldFromNode_;
     std::string materialFolder_;
+    std::set<std::string> bare_;  ///< materials that have faces with and without coordinates
     std::size_t lines_ = 0, points_ = 0;
     bool saysUndefined_ = false;  ///< nothing has been said of materials without a file
 };
@@ -441,8 +450,14 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
     if (format == AssimpFormat::fbx) STX_CHECK(checkFbxClaims(bytes, limits));
     if (format == AssimpFormat::stl) STX_CHECK(checkStlEnd(bytes));
     try {
+        std::set<std::string> bare;
         std::optional<Bytes> usual;
-        if (format == AssimpFormat::obj) usual = withLeadingZeros(bytes);
+        if (format == AssimpFormat::obj) {
+            bare = materialsOfBareFaces(bytes);
+            usual = withLeadingZeros(bytes);
+            if (auto smooth = withSmoothNormals(usual ? ByteSpan(*usual) : bytes))
+                usual = std::move(smooth);
+        }
         if (format == AssimpFormat::stl) {
             usual = lowerCaseStl(bytes);
             if (const auto behind = bytesBehindBinaryStl(bytes); behind > 0) {
@@ -486,7 +501,8 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
             files.job().note(fmt::format(
                 "'{}' is bound to several sets of texture coordinates; all textures have the first",
                 collada.boundTwice));
-        return SceneConverter(scene, format, files, side, plain ? plain->origin : glm::dvec3(0.0))
+        return SceneConverter(scene, format, files, side, plain ? plain->origin : glm::dvec3(0.0),
+                              std::move(bare))
             .convert();
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::failed, "the model needs more memory than there is");

@@ -20,10 +20,6 @@ std::string lowerCase(std::string text) {
     return text;
 }
 
-std::string_view textOf(ByteSpan bytes) {
-    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 /// What the first bytes say for sure.
 Format formatOfBytes(ByteSpan head) {
     auto text = textOf(head);

@@ -13,12 +13,6 @@
 namespace stx {
 namespace {
 
-std::string_view takeWord(std::string_view& text) {
-    const auto word = text.substr(0, text.find_first_of(" \t"));
-    text = trimmed(text.substr(word.size()));
-    return word;
-}
-
 std::string_view takeLine(std::string_view& text) {
     const auto end = text.find('\n');
     const auto line = trimmed(text.substr(0, end));
@@ -107,7 +101,7 @@ std::optional<std::string> plainLine(std::string_view key, std::string_view valu
     if (key == "d" || key == "Tr") {
         constexpr std::string_view kHalo = "-halo";
         const bool halo = key == "d" && value.starts_with(kHalo);
-        if (halo) value = trimmed(value.substr(kHalo.size()));
+        if (halo) value.remove_prefix(kHalo.size());
         const auto numbers = numbersOf(value);
         if (numbers.empty()) return std::nullopt;
         if (halo) material.dropped.push_back(fmt::format("option {} of d", kHalo));

@@ -70,8 +70,7 @@ std::optional<std::string> SideFiles::readFound(const std::string& file,
         if (folder != ".") materialFolder_ = folder.generic_string();
     }
     hasMaterialFile_ = true;
-    auto plain =
-        plainMtl({reinterpret_cast<const char*>(bytes->data()), bytes->size()}, materials_);
+    auto plain = plainMtl(textOf(*bytes), materials_);
     if (const auto count = plain.unread.size(); count > 0)
         files_.job().note(fmt::format("material file '{}', {}: the line is left out{}", file,
                                       plain.unread[0],

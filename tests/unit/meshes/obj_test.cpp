@@ -124,6 +124,67 @@ TEST(Mtl, AnAlphaMapMayBeAChannel) {
     EXPECT_EQ(alphas("map_Kd t.png\nmap_d t.png\n"), glm::ivec2(40, 50));
 }
 
+/// The normals at a place of a folded sheet, two faces along x = 0, after these lines.
+std::vector<glm::vec3> normalsOfFold(const std::string& first, const std::string& second,
+                                     glm::vec3 at) {
+    const auto model =
+        readGoodText("v -1 0 -1\nv 0 0 0\nv 0 1 0\nv -1 1 -1\nv 1 0 -1\nv 1 1 -1\nvt 0 0\n" +
+                         first + "f 1 2 \\\n3/1 4\n" + second + "f -5 -2/1 -1 -4\n",
+                     "a.obj");
+    EXPECT_EQ(model.notes.size(), 1u) << "the model has no colour";
+    std::vector<glm::vec3> normals;
+    for (std::size_t i = 0; i < model.mesh.normals.size(); ++i)
+        if (model.mesh.positions[i] == at) normals.push_back(model.mesh.normals[i]);
+    return normals;
+}
+
+TEST(Obj, SmoothingGroupsHaveNormals) {
+    const glm::vec3 fold(0, 0, 0), outside(1, 0, -1), front(0, 0, 1);
+    const auto right = glm::normalize(glm::vec3(1, 0, 1)), left = right * glm::vec3(-1, 1, 1);
+    const auto all = [&](const std::string& first, const std::string& second) {
+        return normalsOfFold(first, second, fold);
+    };
+    const auto both = all("s 1\n", "");
+    ASSERT_EQ(both.size(), 1u);
+    expectNear(both[0], front);
+    expectNear(normalsOfFold("s 1\n", "", outside).at(0), right);
+    for (const std::string second : {"s off\n", "s 0\n", "s 2\n"}) {
+        const auto apart = all("s 1\n", second);
+        ASSERT_EQ(apart.size(), 2u) << second;
+        expectNear(apart[0], left);
+        expectNear(apart[1], right);
+    }
+    EXPECT_TRUE(all("s off\n", "s 0\n").empty());
+    EXPECT_TRUE(all("", "").empty());
+    EXPECT_EQ(all("s 1\nvn 0 1 0\n", "").size(), 0u) << "a file that has its own";
+    // The two sides of a sheet.
+    const auto sides =
+        readGoodText("v 0 0 0\nv 1 0 0\nv 0 1 0\ns 1\nusemtl a#b\nf 1 2 3\nf 3 2 1\n", "a.obj");
+    ASSERT_EQ(sides.mesh.normals.size(), 6u);
+    expectNear(sides.mesh.normals[0], front);
+    expectNear(sides.mesh.normals[5], -front);
+    EXPECT_TRUE(sides.hasNote("material 'a#b'"));
+}
+
+TEST(Obj, FacesWithoutTextureCoordinatesBesideOthersAreSaid) {
+    TemporaryFolder folder;
+    writePair(folder / "t.png", {255, 0, 0, 255}, {0, 255, 0, 255});
+    write(folder / "a.mtl", "newmtl a\nmap_Kd t.png\nnewmtl b\nKd 1 0 0\n");
+    const auto notes = [&](const std::string& faces) {
+        write(
+            folder / "a.obj",
+            "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\n" + faces);
+        return readGood(folder / "a.obj").notes;
+    };
+    const auto mixed = notes("f 1/1 2/2 3/3\nf 1// 2// 3//\n");
+    ASSERT_EQ(mixed.size(), 1u);
+    EXPECT_EQ(mixed[0],
+              "material 'a': some of its faces have no texture coordinates; they have the colour "
+              "of its texture at 0 0");
+    EXPECT_EQ(notes("f 1 2 3\nf 1/1 2/2 3/3\n").size(), 1u);
+    EXPECT_TRUE(notes("f 1/1 2/2 3/3\nusemtl b\nf 1 2 3\nf 1/1 2/2 3/3\n").empty());
+}
+
 TEST(Mtl, OneValueIsAllThree) {
     TemporaryFolder folder;
     const auto grey = objWith(folder, "Kd 0.5\n");
