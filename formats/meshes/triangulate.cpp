@@ -137,7 +137,7 @@ void triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& t
         corner = at;
         at = next[at];
     }
-    std::ranges::rotate(rest, std::ranges::min_element(rest));
+    std::rotate(rest.begin(), std::ranges::min_element(rest), rest.end());
     fan(rest, triangles);
 }
 
