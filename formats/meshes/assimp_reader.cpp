@@ -7,6 +7,7 @@
 #include "formats/meshes/foreign_scene.hpp"
 #include "formats/meshes/mesh_builder.hpp"
 #include "formats/meshes/mtl_notes.hpp"
+#include "formats/meshes/obj_faces.hpp"
 #include "formats/meshes/readers.hpp"
 #include "formats/meshes/scene_claims.hpp"
 #include "formats/meshes/side_files.hpp"
@@ -49,15 +50,16 @@ constexpr std::uint64_t kSanitizerBytes = 0;
 class SceneConverter {
   public:
     SceneConverter(const ForeignScene& scene, AssimpFormat format, ModelFiles& files,
-                   const SideFiles& side, glm::dvec3 origin)
+                   const SideFiles& side, glm::dvec3 origin, std::set<std::string> bare)
         : scene_(scene),
           format_(format),
           files_(files),
           builder_(files.job()),
-          materialFolder_(side.materialFolder()) {
-        for (const auto& text : side.texts()) scanMtl(text, mtl_);
+          mtl_(side.materials()),
+          materialFolder_(side.materialFolder()),
+          bare_(std::move(bare)) {
         saysUndefined_ = format == AssimpFormat::obj && !files.replacesColour() &&
-                         (side.missing().empty() || !side.texts().empty());
+                         (side.missing().empty() || side.hasMaterialFile());
         builder_.setOrigin(origin);
     }
 
@@ -121,16 +123,17 @@ class SceneConverter {
             m.baseColour.a = opacity;
             m.alpha = Material::Alpha::blend;
         }
-        for (const auto& option : mtl.droppedOptions)
-            files_.job().note(fmt::format("material '{}': option {} is dropped", m.name, option));
+        for (const auto& what : mtl.dropped)
+            files_.job().note(fmt::format("material '{}': {} is dropped", m.name, what));
 
+        const bool ownAlpha = !mtl.alphaMap.empty() && mtl.alphaMap == mtl.diffuseMap &&
+                              (mtl.alphaChannel == 0 || mtl.alphaChannel == 'm');
         if (hasMap && !files_.replacesColour()) {
             STX_TRY(m.baseColourTexture, texture(source, Use::diffuse));
-            if (!mtl.alphaMap.empty() && mtl.alphaMap == mtl.diffuseMap)
-                m.alpha = Material::Alpha::blend;
+            if (ownAlpha) m.alpha = Material::Alpha::blend;
         }
-        if (!mtl.alphaMap.empty() && mtl.alphaMap != mtl.diffuseMap && !files_.replacesColour())
-            STX_CHECK(addAlphaMap(source, m));
+        if (!mtl.alphaMap.empty() && !ownAlpha && !files_.replacesColour())
+            STX_CHECK(addAlphaMap(source, mtl.alphaChannel, m));
         STX_CHECK(addEmission(source, mtl, scene, m));
         if (textureOf(source, Use::normals))
             STX_SET(m.normalTexture, texture(source, Use::normals));
@@ -141,6 +144,12 @@ class SceneConverter {
                 files_.job().note(fmt::format("material '{}': its {} is dropped", m.name, label));
         }
         noteUvSets(source);
+        if (bare_.contains(m.name) &&
+            std::ranges::any_of(source.textures, [](const auto& t) { return t.has_value(); }))
+            files_.job().note(fmt::format(
+                "material '{}': some of its faces have no texture coordinates; they have the "
+                "colour of its texture at 0 0",
+                m.name));
         builder_.materials().push_back(std::move(m));
         mtlOf_.push_back(mtl);
         return {};
@@ -173,14 +182,14 @@ class SceneConverter {
     }
 
     /// map_d becomes the alpha of the base colour texture.
-    Result<void> addAlphaMap(const ForeignScene::Material& source, Material& m) {
+    Result<void> addAlphaMap(const ForeignScene::Material& source, char channel, Material& m) {
         if (!textureOf(source, Use::opacity)) return {};
         STX_TRY(const int map, texture(source, Use::opacity));
         if (map < 0) return {};
         auto& textures = builder_.textures();
         const auto& like = textures[m.baseColourTexture >= 0 ? m.baseColourTexture : map];
         STX_CHECK(builder_.charge(like.pixels.count(), sizeof(glm::u8vec4), "the alpha maps"));
-        m.baseColourTexture = textureWithAlpha(textures, m.baseColourTexture, map);
+        m.baseColourTexture = textureWithAlpha(textures, m.baseColourTexture, map, channel);
         m.alpha = Material::Alpha::blend;
         return {};
     }
@@ -377,10 +386,11 @@ class SceneConverter {
     AssimpFormat format_;
     ModelFiles& files_;
     MeshBuilder builder_;
-    std::map<std::string, MtlMaterial> mtl_;
+    const std::map<std::string, MtlMaterial>& mtl_;
     std::vector<MtlMaterial> mtlOf_;  ///< of each material
     std::vector<glm::dmat4> worldFromNode_;
     std::string materialFolder_;
+    std::set<std::string> bare_;  ///< materials that have faces with and without coordinates
     std::size_t lines_ = 0, points_ = 0;
     bool saysUndefined_ = false;  ///< nothing has been said of materials without a file
 };
@@ -440,9 +450,23 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
     if (format == AssimpFormat::fbx) STX_CHECK(checkFbxClaims(bytes, limits));
     if (format == AssimpFormat::stl) STX_CHECK(checkStlEnd(bytes));
     try {
-        std::optional<Bytes> zeros;
-        if (format == AssimpFormat::obj) zeros = withLeadingZeros(bytes);
-        if (zeros) bytes = *zeros;
+        std::set<std::string> bare;
+        std::optional<Bytes> usual;
+        if (format == AssimpFormat::obj) {
+            bare = materialsOfBareFaces(bytes);
+            usual = withLeadingZeros(bytes);
+            if (auto smooth = withSmoothNormals(usual ? ByteSpan(*usual) : bytes))
+                usual = std::move(smooth);
+        }
+        if (format == AssimpFormat::stl) {
+            usual = lowerCaseStl(bytes);
+            if (const auto behind = bytesBehindBinaryStl(bytes); behind > 0) {
+                files.job().note(
+                    fmt::format("dropped: what is behind the last facet ({} bytes)", behind));
+                bytes = bytes.first(bytes.size() - behind);
+            }
+        }
+        if (usual) bytes = *usual;
         PlainCollada collada;
         if (format == AssimpFormat::dae) {
             STX_SET(collada, plainCollada(bytes));
@@ -466,7 +490,7 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         STX_TRY(auto scene, hear(*process, format, side, limits));
         if (format == AssimpFormat::stl && scene.meshes.size() == 1)
             readStlColours(bytes, scene.meshes[0].colours);
-        if (!side.missing().empty() && side.texts().empty())
+        if (!side.missing().empty() && !side.hasMaterialFile())
             files.job().note(
                 fmt::format("material file {}; its materials have no colour", side.missing()));
         if (!collada.wrap.empty())
@@ -477,7 +501,8 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
             files.job().note(fmt::format(
                 "'{}' is bound to several sets of texture coordinates; all textures have the first",
                 collada.boundTwice));
-        return SceneConverter(scene, format, files, side, plain ? plain->origin : glm::dvec3(0.0))
+        return SceneConverter(scene, format, files, side, plain ? plain->origin : glm::dvec3(0.0),
+                              std::move(bare))
             .convert();
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::failed, "the model needs more memory than there is");

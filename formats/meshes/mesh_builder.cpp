@@ -143,6 +143,7 @@ Result<void> MeshBuilder::add(MeshPart part) {
         return fail(ErrorCode::invalidInput, "{}: the model has more than 2^32 vertices",
                     part.where);
     repair(part);
+    if (part.points) paintPoints(part);
 
     const auto added = part.positions.size();
     append(mesh_.normals, before, part.normals, added, kNoNormal);
@@ -197,6 +198,19 @@ void MeshBuilder::dropBrokenPoints(MeshPart& part) {
     keep(part.colours);
     keep(part.uvs);
     for (const auto& [own, _] : kOwnUvs) keep(part.*own);
+}
+
+/// A Mesh has no material of points: its colour goes into their vertices.
+void MeshBuilder::paintPoints(MeshPart& part) {
+    if (part.material >= mesh_.materials.size()) return;
+    const Material& m = mesh_.materials[part.material];
+    if (m.baseColourTexture >= 0)
+        job_.note(fmt::format("{}: the texture of material '{}' is not drawn on points", part.where,
+                              m.name));
+    const glm::vec3 base(m.baseColour), light = m.emissiveTexture < 0 ? m.emissive : glm::vec3(0);
+    if (base == glm::vec3(1) && light == glm::vec3(0)) return;
+    part.colours.resize(part.positions.size(), glm::vec4(1));
+    for (auto& c : part.colours) c = glm::vec4(glm::vec3(c) * base + light, c.a);
 }
 
 void MeshBuilder::repair(MeshPart& part) {

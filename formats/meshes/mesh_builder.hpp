@@ -42,7 +42,8 @@ class MeshBuilder {
     /// Appends a part. Errors (invalidInput) name part and vertex: a position that is not finite,
     /// an index out of range. Points of a cloud at no finite place are skipped and counted.
     /// Triangles without area are left out and counted; normals that are not directions are
-    /// replaced by those of the triangles; uvs and colours that are not finite become 0.
+    /// replaced by those of the triangles; uvs and colours that are not finite become 0. The colour
+    /// of points is that of their vertices times that of their material; its texture is not used.
     [[nodiscard]] Result<void> add(MeshPart part);
 
     /// How many were appended.
@@ -58,6 +59,7 @@ class MeshBuilder {
   private:
     void repair(MeshPart& part);
     void dropBrokenPoints(MeshPart& part);
+    void paintPoints(MeshPart& part);
     void fillNormals();
     void roundPositions();
     void dropUnusedTextures();

@@ -8,6 +8,7 @@
 #include "formats/images/more_pictures.hpp"
 #include "formats/meshes/readers.hpp"
 #include "formats/meshes/text_encoding.hpp"
+#include "formats/meshes/vertex_colours.hpp"
 
 namespace stx {
 namespace {
@@ -17,10 +18,6 @@ enum class Format { none, gltf, glb, obj, ply, stl, draco, off, dae, fbx, spz };
 std::string lowerCase(std::string text) {
     for (auto& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
     return text;
-}
-
-std::string_view textOf(ByteSpan bytes) {
-    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 /// What the first bytes say for sure.
@@ -56,7 +53,7 @@ Format formatOfEnding(const std::filesystem::path& path) {
 
 /// For files without a telling ending: JSON with an asset, ASCII STL.
 Format formatOfText(ByteSpan head) {
-    const auto text = textOf(head);
+    const auto text = lowerCase(std::string(textOf(head)));
     const auto first = text.find_first_not_of(" \t\r\n");
     if (first != std::string_view::npos && text[first] == '{' &&
         text.find("\"asset\"") != std::string_view::npos)
@@ -123,14 +120,17 @@ Result<void> addTexture(Mesh& mesh, const std::filesystem::path& path, Job& job)
 
 /// A model of which nobody says what colour it has is grey: white without shadows is a flat shape.
 void giveGrey(Mesh& mesh, Job& job) {
-    constexpr float kGrey = 0.5f;  // linear; 188 of 255 as sRGB
     const bool hasColour =
         mesh.splats || !mesh.colours.empty() ||
         std::any_of(mesh.materials.begin(), mesh.materials.end(), [](auto& m) {
             return m.hasColour || m.baseColourTexture >= 0 || m.emissive != glm::vec3(0.0f);
         });
     if (hasColour) return;
-    for (auto& m : mesh.materials) m.baseColour = glm::vec4(glm::vec3(kGrey), m.baseColour.a);
+    const glm::vec3 grey(kPlainGrey);
+    for (auto& m : mesh.materials) m.baseColour = glm::vec4(grey, m.baseColour.a);
+    // Loose points have no material.
+    if (!mesh.points.empty()) mesh.colours.assign(mesh.positions.size(), glm::vec4(1.0f));
+    for (const auto p : mesh.points) mesh.colours[p] = glm::vec4(grey, 1.0f);
     job.note(
         "the model has no colour: it is drawn in plain grey; lights show its form (stx render "
         "--light dir:-1,-1,-1)");

@@ -1,118 +1,150 @@
 #include "formats/meshes/mtl_notes.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+#include <optional>
 
 #include <fmt/format.h>
 
+#include "formats/files/no_case.hpp"
 #include "formats/meshes/text_encoding.hpp"
+#include "lib/base/whole_number.hpp"
 
 namespace stx {
 namespace {
 
-/// `-s u v w`: one to three numbers behind an option; v stays as it is when only u is given.
-void readVector(std::string_view text, std::string_view option, glm::vec2& to) {
-    // A word of its own, not a part of a name.
-    const auto isWord = [&](std::size_t at) {
-        const auto end = at + option.size();
-        return (at == 0 || isBlank(text[at - 1])) && end < text.size() && isBlank(text[end]);
-    };
-    auto at = text.find(option);
-    while (at != std::string_view::npos && !isWord(at)) at = text.find(option, at + 1);
-    if (at == std::string_view::npos) return;
-    text.remove_prefix(at + option.size());
-    for (int k = 0; k < 2; ++k) {
-        while (!text.empty() && (text.front() == ' ' || text.front() == '\t'))
-            text.remove_prefix(1);
-        if (text.starts_with('+')) text.remove_prefix(1);
-        float value = 0;
-        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-        const auto used = static_cast<std::size_t>(end - text.data());
-        const bool whole = used == text.size() || text[used] == ' ' || text[used] == '\t';
-        if (error != std::errc() || !whole || !std::isfinite(value)) return;
-        to[k] = value;
-        text.remove_prefix(used);
-    }
-}
-
-/// A line of an MTL text: its first word, and what is behind it.
-struct MtlLine {
-    std::string_view key, value;
-};
-
-MtlLine takeLine(std::string_view& text) {
+std::string_view takeLine(std::string_view& text) {
     const auto end = text.find('\n');
     const auto line = trimmed(text.substr(0, end));
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-    const auto blank = line.find_first_of(" \t");
-    if (blank == std::string_view::npos) return {line, {}};
-    return {line.substr(0, blank), trimmed(line.substr(blank))};
+    return line;
 }
 
-constexpr std::string_view kHalo = "-halo";
-
-bool hasHalo(const MtlLine& line) {
-    return line.key == "d" && line.value.starts_with(kHalo);
-}
-
-bool isMap(std::string_view key) {
-    constexpr std::string_view kOthers[] = {"bump", "decal", "disp", "norm", "refl"};
-    return key.starts_with("map_") || std::ranges::find(kOthers, key) != std::end(kOthers);
-}
-
-std::string_view takeWord(std::string_view& text) {
-    const auto word = text.substr(0, text.find_first_of(" \t"));
-    text = trimmed(text.substr(word.size()));
-    return word;
-}
-
-/// Whether it begins with a number and has more behind it: the last word is the file's name.
-bool beginsWithNumber(std::string_view text) {
-    auto word = takeWord(text);
+/// A finite number that is all of a word.
+std::optional<float> numberOf(std::string_view word) {
     if (word.starts_with('+')) word.remove_prefix(1);
-    float value = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    return error == std::errc() && end == word.data() + word.size() && !text.empty();
+    const auto value = wholeNumber<float>(word);
+    return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
-/// What is behind the key of a map, all of u, v and w given in its options.
-std::string withWholeOptions(std::string_view value) {
-    std::string out;
+/// Takes numbers off a text until one is not; never its last word, which is the name of a file.
+std::vector<float> takeNumbers(std::string_view& text, std::size_t most) {
+    std::vector<float> numbers;
+    while (numbers.size() < most) {
+        auto rest = text;
+        const auto number = numberOf(takeWord(rest));
+        if (!number || rest.empty()) break;
+        numbers.push_back(*number);
+        text = rest;
+    }
+    return numbers;
+}
+
+/// The numbers that follow a keyword.
+std::vector<float> numbersOf(std::string_view values) {
+    std::vector<float> numbers;
+    while (const auto number = numberOf(takeWord(values))) numbers.push_back(*number);
+    return numbers;
+}
+
+/// Keywords, which some programs write in lower case, as Assimp and Wavefront's specification have
+/// them.
+constexpr std::string_view kKeys[] = {
+    "newmtl",       "Kd",   "Ke",       "d",    "Tr",     "map_Kd", "map_d",    "map_Ke",
+    "map_emissive", "bump", "map_bump", "norm", "map_Kn", "disp",   "map_disp", "decal"};
+
+std::string_view keyOf(std::string_view word) {
+    const auto* const found =
+        std::ranges::find_if(kKeys, [&](std::string_view key) { return equalNoCase(key, word); });
+    return found == std::end(kKeys) ? std::string_view{} : *found;
+}
+
+/// What is behind the keyword of a map, before the file: notes what the material has to know, and
+/// gives the options that are for Assimp.
+std::string takeOptions(std::string_view key, std::string_view& value, MtlMaterial& material) {
+    std::string kept;
+    const bool colour = key == "map_Kd";
     while (value.starts_with('-')) {
         const auto option = takeWord(value);
-        out += fmt::format("{} ", option);
-        // What begins with no number is left to Assimp.
-        const bool vector =
-            (option == "-o" || option == "-s" || option == "-t") && beginsWithNumber(value);
-        const int most = vector ? 3 : option == "-mm" ? 2 : 1;
-        int found = 0;
-        for (; found < most && (!vector || beginsWithNumber(value)); ++found)
-            out += fmt::format("{} ", takeWord(value));
-        for (; vector && found < most; ++found) out += option == "-s" ? "1 " : "0 ";
+        if (colour && (option == "-t" || option == "-mm" || option == "-boost"))
+            material.dropped.push_back(fmt::format("option {} of {}", option, key));
+        if (option == "-o" || option == "-s" || option == "-t") {
+            // v and w may be left out.
+            const auto numbers = takeNumbers(value, 3);
+            if (!colour || option == "-t") continue;
+            auto& to = option == "-s" ? material.uvScale : material.uvOffset;
+            for (std::size_t k = 0; k < std::min<std::size_t>(numbers.size(), 2); ++k)
+                to[static_cast<int>(k)] = numbers[k];
+        } else if (option == "-mm") {
+            (void)takeNumbers(value, 2);
+        } else {
+            const auto word = takeWord(value);
+            if (option == "-clamp") kept = fmt::format("-clamp {} ", word);
+            if (option == "-imfchan" && key == "map_d" && !word.empty())
+                material.alphaChannel = word.front();
+        }
     }
-    return out.append(value);
+    return kept;
+}
+
+/// A line with one of kKeys as Assimp shall have it; nothing when it is not understood.
+std::optional<std::string> plainLine(std::string_view key, std::string_view value,
+                                     MtlMaterial& material) {
+    if (key == "Kd" || key == "Ke") {
+        const auto rgb = numbersOf(value);
+        if (rgb.size() != 1 && rgb.size() < 3) return std::nullopt;
+        (key == "Kd" ? material.hasDiffuse : material.hasEmission) = true;
+        // One value of a colour is all three.
+        const bool one = rgb.size() == 1;
+        return fmt::format("{} {} {} {}\n", key, rgb[0], rgb[one ? 0 : 1], rgb[one ? 0 : 2]);
+    }
+    if (key == "d" || key == "Tr") {
+        constexpr std::string_view kHalo = "-halo";
+        const bool halo = key == "d" && value.starts_with(kHalo);
+        if (halo) value.remove_prefix(kHalo.size());
+        const auto numbers = numbersOf(value);
+        if (numbers.empty()) return std::nullopt;
+        if (halo) material.dropped.push_back(fmt::format("option {} of d", kHalo));
+        (key == "d" ? material.hasDissolve : material.hasTransparency) = true;
+        return fmt::format("{} {}\n", key, numbers[0]);
+    }
+    if (key == "decal") {
+        material.dropped.emplace_back(key);
+        return "";
+    }
+    const auto options = takeOptions(key, value, material);
+    if (value.empty()) return std::nullopt;
+    if (key == "map_Kd" || key == "map_d") {
+        auto file = value;
+        if (file.size() > 1 && file.starts_with('"') && file.ends_with('"'))
+            file = file.substr(1, file.size() - 2);
+        (key == "map_Kd" ? material.diffuseMap : material.alphaMap) = file;
+    }
+    return fmt::format("{} {}{}\n", key, options, value);
 }
 
 }  // namespace
 
-std::string plainMtl(std::string_view text) {
-    std::string out;
-    out.reserve(text.size());
-    while (!text.empty()) {
-        const auto before = text;
+PlainMtl plainMtl(std::string_view text, std::map<std::string, MtlMaterial>& materials) {
+    PlainMtl out;
+    MtlMaterial* current = nullptr;
+    for (int number = 1; !text.empty(); ++number) {
         const auto line = takeLine(text);
-        const auto number = trimmed(line.value.substr(0, line.value.find('#')));
-        const bool colour =
-            line.key == "Kd" || line.key == "Ke" || line.key == "Ka" || line.key == "Ks";
-        if (colour && !number.empty() && std::ranges::none_of(number, isBlank))
-            out += fmt::format("{0} {1} {1} {1}\n", line.key, number);
-        else if (hasHalo(line))
-            out += fmt::format("d {}\n", trimmed(line.value.substr(kHalo.size())));
-        else if (isMap(line.key) && line.value.starts_with('-'))
-            out += fmt::format("{} {}\n", line.key, withWholeOptions(line.value));
-        else
-            out += before.substr(0, before.size() - text.size());
+        auto value = line;
+        const auto key = keyOf(takeWord(value));
+        if (key == "newmtl") {
+            current = &materials[std::string(value)];
+            out.text += fmt::format("newmtl {}\n", value);
+        } else if (current && !key.empty()) {
+            if (const auto plain = plainLine(key, value, *current))
+                out.text += *plain;
+            else
+                out.unread.push_back(fmt::format("line {}: '{}', expected '{} {}'", number,
+                                                 line.substr(0, 60), key,
+                                                 key == "Kd" || key == "Ke"  ? "R G B"
+                                                 : key == "d" || key == "Tr" ? "NUMBER"
+                                                                             : "FILE"));
+        }
     }
     return out;
 }
@@ -122,8 +154,7 @@ std::vector<std::string> materialFilesIn(std::string_view line) {
     const auto isEnd = [&](std::size_t at) {
         constexpr std::string_view kEnding = ".mtl";
         return at >= kEnding.size() && isBlank(line[at]) &&
-               std::ranges::equal(line.substr(at - kEnding.size(), kEnding.size()), kEnding, {},
-                                  [](char c) { return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c; });
+               equalNoCase(line.substr(at - kEnding.size(), kEnding.size()), kEnding);
     };
     std::size_t from = 0;
     for (std::size_t at = 0; at <= line.size(); ++at) {
@@ -133,44 +164,6 @@ std::vector<std::string> materialFilesIn(std::string_view line) {
         from = at;
     }
     return names;
-}
-
-void scanMtl(std::string_view text, std::map<std::string, MtlMaterial>& materials) {
-    MtlMaterial* current = nullptr;
-    while (!text.empty()) {
-        const auto line = takeLine(text);
-        const auto& [key, value] = line;
-        if (key == "newmtl") {
-            current = &materials[std::string(value)];
-        } else if (!current) {
-            continue;
-        } else if (key == "Kd") {
-            current->hasDiffuse = true;
-        } else if (key == "d") {
-            current->hasDissolve = true;
-            if (hasHalo(line)) current->droppedOptions.push_back(fmt::format("{} of d", kHalo));
-        } else if (key == "Ke") {
-            current->hasEmission = true;
-        } else if (key == "Tr") {
-            current->hasTransparency = true;
-        } else if (key == "map_Kd" || key == "map_d") {
-            // The last word, or what is in quotes at the end.
-            const bool quoted = value.size() > 1 && value.ends_with('"');
-            const auto last =
-                quoted ? value.rfind('"', value.size() - 2) : value.find_last_of(" \t");
-            auto file = last == std::string_view::npos ? value : value.substr(last + 1);
-            if (quoted) file.remove_suffix(1);
-            (key == "map_Kd" ? current->diffuseMap : current->alphaMap) = file;
-            if (key == "map_Kd") {
-                readVector(value, "-s", current->uvScale);
-                readVector(value, "-o", current->uvOffset);
-            }
-            for (const std::string_view option : {"-t ", "-mm ", "-boost "}) {
-                if (key == "map_Kd" && value.find(option) != std::string_view::npos)
-                    current->droppedOptions.push_back(fmt::format("{} of map_Kd", trimmed(option)));
-            }
-        }
-    }
 }
 
 }  // namespace stx

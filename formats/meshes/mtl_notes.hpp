@@ -15,20 +15,28 @@ struct MtlMaterial {
     bool hasDissolve = false;                 ///< a d line
     bool hasTransparency = false;             ///< a Tr line and no d line
     bool hasEmission = false;                 ///< a Ke line
-    std::string diffuseMap, alphaMap;         ///< last word of map_Kd, map_d
+    std::string diffuseMap, alphaMap;         ///< files of map_Kd, map_d
+    char alphaChannel = 0;                    ///< -imfchan of map_d: r, g, b, m, l, z; 0: not given
     glm::vec2 uvScale{1.0f}, uvOffset{0.0f};  ///< -s and -o of map_Kd; v runs up
-    std::vector<std::string> droppedOptions;  ///< "-t of map_Kd", …
+    std::vector<std::string> dropped;         ///< "option -t of map_Kd", "decal", …
 };
 
-/// An MTL text as Assimp reads it right: one value of a colour is all three (it would take the
-/// others for 0), -halo of d, which it takes for a number, is left out, and -o, -s and -t of maps
-/// have u, v and w, of which the last two may be left out (it would take the file's name for one).
-[[nodiscard]] std::string plainMtl(std::string_view text);
+/// An MTL text for Assimp, and what it takes away of it.
+struct PlainMtl {
+    /// The lines that a Mesh has a use for, as Assimp reads them right: keywords in Wavefront's
+    /// case, colours of three values, maps with the option -clamp only. Other lines may hold what
+    /// Assimp stops at.
+    std::string text;
+    /// "line 3: 'Kd spectral a.rfl 1', expected 'Kd R G B'": lines that have a use, but are not
+    /// understood, and are left out.
+    std::vector<std::string> unread;
+};
+
+/// Adds the materials of an MTL text to `materials`, by name.
+[[nodiscard]] PlainMtl plainMtl(std::string_view text,
+                                std::map<std::string, MtlMaterial>& materials);
 
 /// The files that what follows a `mtllib` names. Names may have blanks: one ends with ".mtl".
 [[nodiscard]] std::vector<std::string> materialFilesIn(std::string_view line);
-
-/// Adds the materials of one MTL text to `materials`, by name.
-void scanMtl(std::string_view text, std::map<std::string, MtlMaterial>& materials);
 
 }  // namespace stx

@@ -76,6 +76,11 @@ double colourScale(PlyType type) {
     }
 }
 
+bool hasRole(const PlyElement& ofVertices, Role role) {
+    return std::ranges::any_of(ofVertices.properties,
+                               [&](const PlyProperty& p) { return roleOf(p, false) == role; });
+}
+
 class PlyReader {
   public:
     PlyReader(ByteSpan bytes, PlyHeader header, ModelFiles& files)
@@ -85,11 +90,18 @@ class PlyReader {
           builder_(files.job()) {}
 
     Result<Mesh> read() {
+        // Faces may come before the vertices that they name.
+        const auto isVertex = [](const PlyElement& e) { return e.name == "vertex"; };
+        if (std::ranges::count_if(header_.elements, isVertex) > 1)
+            return fail(ErrorCode::invalidInput,
+                        "the PLY header has two lists of 'vertex'; one is expected");
+        if (const auto vertex = std::ranges::find_if(header_.elements, isVertex);
+            vertex != header_.elements.end()) {
+            vertices_ = vertex->count;
+            hasVertexUvs_ = hasRole(*vertex, Role::u) && hasRole(*vertex, Role::v);
+        }
         for (const auto& element : header_.elements) {
-            if (element.name == "vertex") {
-                if (!positions_.empty())
-                    return fail(ErrorCode::invalidInput,
-                                "the PLY header has two lists of 'vertex'; one is expected");
+            if (isVertex(element)) {
                 STX_CHECK(readVertices(element));
             } else if (element.name == "face" || element.name == "tristrips") {
                 STX_CHECK(readFaces(element));
@@ -113,6 +125,7 @@ class PlyReader {
     static constexpr std::uint32_t kNoTexture = std::numeric_limits<std::uint32_t>::max();
     struct Face {
         std::uint32_t firstCorner = 0;  ///< in corners_
+        bool ownUvs = false;            ///< those of its corners, else those of its vertices
         std::uint32_t texture = 0;      ///< of textureFiles, or kNoTexture
         glm::vec4 colour{1.0f};
     };
@@ -176,15 +189,12 @@ class PlyReader {
     Result<void> readVertices(const PlyElement& element) {
         std::vector<Role> roles;
         for (const auto& p : element.properties) roles.push_back(roleOf(p, false));
-        const auto has = [&](Role r) {
-            return std::find(roles.begin(), roles.end(), r) != roles.end();
-        };
+        const auto has = [&](Role r) { return hasRole(element, r); };
         if (!has(Role::x) || !has(Role::y) || !has(Role::z))
             return fail(ErrorCode::invalidInput, "the PLY vertices have no x, y and z");
         STX_CHECK(builder_.charge(element.count, 24 + 12 + 16 + 8, "the PLY vertices"));
         const bool hasNormals = has(Role::nx) && has(Role::ny) && has(Role::nz);
         const bool hasColours = has(Role::red) && has(Role::green) && has(Role::blue);
-        const bool hasUvs = has(Role::u) && has(Role::v);
         for (std::uint64_t i = 0; i < element.count; ++i) {
             std::array<double, 16> v{};
             v[static_cast<std::size_t>(Role::alpha)] = 1.0;
@@ -213,7 +223,7 @@ class PlyReader {
             if (hasNormals) normals_.emplace_back(f(Role::nx), f(Role::ny), f(Role::nz));
             if (hasColours)
                 colours_.emplace_back(f(Role::red), f(Role::green), f(Role::blue), f(Role::alpha));
-            if (hasUvs) uvs_.emplace_back(f(Role::u), 1.0f - f(Role::v));
+            if (hasVertexUvs_) uvs_.emplace_back(f(Role::u), 1.0f - f(Role::v));
         }
         const bool splats = std::any_of(element.properties.begin(), element.properties.end(),
                                         [](const PlyProperty& p) { return p.name == "f_dc_0"; });
@@ -268,8 +278,9 @@ class PlyReader {
                 continue;
             }
             const bool withUvs = cornerUvs.size() == indices.size() * 2;
+            face.ownUvs = withUvs;
             hasCornerUvs_ = hasCornerUvs_ || withUvs;
-            if (!withUvs && uvs_.empty()) face.texture = kNoTexture;
+            if (!withUvs && !hasVertexUvs_) face.texture = kNoTexture;
             hasPlainFaces_ = hasPlainFaces_ || face.texture == kNoTexture;
             face.firstCorner = static_cast<std::uint32_t>(corners_.size());
             for (std::size_t k = 0; k < indices.size(); ++k) {
@@ -286,13 +297,11 @@ class PlyReader {
     }
 
     Result<Corner> cornerAt(const PlyElement& element, std::uint64_t i, double index) {
-        if (!(index >= 0) || index >= static_cast<double>(positions_.size()) ||
-            std::floor(index) != index)
+        if (!(index >= 0) || index >= static_cast<double>(vertices_) || std::floor(index) != index)
             return fail(ErrorCode::invalidInput,
                         "{} {} uses vertex {}, but there are only {} vertices", element.name, i,
-                        index, positions_.size());
-        const auto vertex = static_cast<std::uint32_t>(index);
-        return Corner{vertex, uvs_.empty() ? glm::vec2(0.0f) : uvs_[vertex]};
+                        index, vertices_);
+        return Corner{static_cast<std::uint32_t>(index)};
     }
 
     /// Stanford's triangle strips: one list, -1 begins a new strip.
@@ -353,17 +362,19 @@ class PlyReader {
     }
 
     /// Corners that are vertices of their own, with the colour of their face if it is given.
-    void addCorners(std::uint32_t first, std::uint32_t end, const glm::vec4* faceColour,
-                    MeshPart& part) const {
-        for (auto c = first; c < end; ++c) {
+    void addCorners(const Face& face, std::uint32_t end, bool faceColour, MeshPart& part) const {
+        for (auto c = face.firstCorner; c < end; ++c) {
             const auto v = corners_[c].vertex;
             part.positions.push_back(positions_[v]);
             if (!normals_.empty()) part.normals.push_back(normals_[v]);
             if (faceColour)
-                part.colours.push_back(*faceColour);
+                part.colours.push_back(face.colour);
             else if (!colours_.empty())
                 part.colours.push_back(colours_[v]);
-            if (hasCornerUvs_ || !uvs_.empty()) part.uvs.push_back(corners_[c].uv);
+            if (!uvs_.empty() && !face.ownUvs)
+                part.uvs.push_back(uvs_[v]);
+            else if (hasCornerUvs_)
+                part.uvs.push_back(corners_[c].uv);
         }
     }
 
@@ -375,6 +386,8 @@ class PlyReader {
         if (faces_.empty()) return addPoints();
         const auto materials = static_cast<std::uint32_t>(builder_.materials().size());
         const bool useFaceColours = hasFaceColours_ && colours_.empty();
+        if (hasFaceColours_ && !useFaceColours)
+            files_.job().note("dropped: the colours of PLY faces; those of the vertices are drawn");
         if (useFaceColours) {
             std::vector<glm::vec4> colours;
             for (const auto& f : faces_) colours.push_back(f.colour);
@@ -406,8 +419,7 @@ class PlyReader {
                 else
                     part.triangles.push_back(t + base);
             }
-            if (!shared)
-                addCorners(face.firstCorner, end, useFaceColours ? &face.colour : nullptr, part);
+            if (!shared) addCorners(face, end, useFaceColours, part);
         }
         for (auto& [texture, part] : parts) {
             part.where = "PLY";
@@ -435,7 +447,9 @@ class PlyReader {
     std::vector<glm::vec2> uvs_;
     std::vector<Face> faces_;
     std::vector<Corner> corners_;
-    bool hasCornerUvs_ = false, hasPlainFaces_ = false, hasFaceColours_ = false;
+    std::uint64_t vertices_ = 0;  ///< as the header says
+    bool hasVertexUvs_ = false, hasCornerUvs_ = false, hasPlainFaces_ = false,
+         hasFaceColours_ = false;
     std::uint32_t textured_ = 0;  ///< materials that may have a texture
     bool floatColours_ = false, floatFaceColours_ = false;
     std::size_t shortFaces_ = 0;

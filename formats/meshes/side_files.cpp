@@ -1,7 +1,6 @@
 #include "formats/meshes/side_files.hpp"
 
 #include "formats/meshes/model_wire.hpp"
-#include "formats/meshes/mtl_notes.hpp"
 #include "formats/meshes/text_encoding.hpp"
 
 namespace stx {
@@ -66,12 +65,17 @@ std::optional<std::string> SideFiles::readFound(const std::string& file,
         return std::nullopt;
     }
     if (auto text = utf8FromMarked(*bytes)) *bytes = std::move(*text);
-    if (texts_.empty()) {
+    if (!hasMaterialFile_) {
         const auto folder = path.parent_path().lexically_relative(files_.folder());
         if (folder != ".") materialFolder_ = folder.generic_string();
     }
-    texts_.emplace_back(reinterpret_cast<const char*>(bytes->data()), bytes->size());
-    return plainMtl(texts_.back());
+    hasMaterialFile_ = true;
+    auto plain = plainMtl(textOf(*bytes), materials_);
+    if (const auto count = plain.unread.size(); count > 0)
+        files_.job().note(fmt::format("material file '{}', {}: the line is left out{}", file,
+                                      plain.unread[0],
+                                      count > 1 ? fmt::format(", and {} like it", count - 1) : ""));
+    return std::move(plain.text);
 }
 
 }  // namespace stx

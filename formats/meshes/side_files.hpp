@@ -1,11 +1,12 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
-#include <vector>
 
 #include "formats/meshes/model_files.hpp"
+#include "formats/meshes/mtl_notes.hpp"
 
 namespace stx {
 
@@ -16,8 +17,9 @@ class SideFiles {
     explicit SideFiles(ModelFiles& files) : files_(files) {}
 
     [[nodiscard]] bool exists(std::string_view name);
-    /// The text of one as plainMtl() gives it; nothing when it is not there. Where a name is of
-    /// several files that are, as in `mtllib a.mtl b.mtl`, the text of all.
+    /// The text of one as plainMtl() gives it, with a note of what it cannot read; nothing when it
+    /// is not there. Where a name is of several files that are, as in `mtllib a.mtl b.mtl`, the
+    /// text of all.
     [[nodiscard]] std::optional<Bytes> read(std::string_view name);
 
     /// A file that is there but cannot be read.
@@ -26,8 +28,9 @@ class SideFiles {
     [[nodiscard]] const std::string& missing() const { return missing_; }
     /// Folder of the first material file, relative to the model's; empty when it is the same.
     [[nodiscard]] const std::string& materialFolder() const { return materialFolder_; }
-    /// Text of the material files that were opened, in order.
-    [[nodiscard]] const std::vector<std::string>& texts() const { return texts_; }
+    /// Whether a material file was opened, and the materials of all, by name.
+    [[nodiscard]] bool hasMaterialFile() const { return hasMaterialFile_; }
+    [[nodiscard]] const std::map<std::string, MtlMaterial>& materials() const { return materials_; }
 
   private:
     std::optional<std::filesystem::path> find(const std::string& file);
@@ -38,7 +41,8 @@ class SideFiles {
     std::optional<Error> error_;
     std::string missing_;
     std::string materialFolder_;
-    std::vector<std::string> texts_;
+    bool hasMaterialFile_ = false;
+    std::map<std::string, MtlMaterial> materials_;
     std::set<std::string> opened_;  ///< paths of side files
 };
 

@@ -1,7 +1,11 @@
 #include "formats/meshes/stl_colours.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <string_view>
+
+#include "formats/meshes/vertex_colours.hpp"
+#include "lib/model/texture.hpp"
 
 namespace stx {
 namespace {
@@ -26,8 +30,30 @@ std::optional<glm::vec4> objectColour(ByteSpan bytes) {
 std::optional<std::uint32_t> facetsOfBinaryStl(ByteSpan bytes) {
     std::uint32_t facets = 0;
     if (bytes.size() >= kFacets) std::memcpy(&facets, bytes.data() + kHeader, sizeof(facets));
-    if (bytes.size() != kFacets + std::uint64_t{facets} * kFacet) return std::nullopt;
+    // Some programs write more behind them. In a text these four letters are a count that no file
+    // is long enough for.
+    const bool whole = bytes.size() >= kFacets + std::uint64_t{facets} * kFacet;
+    if (!whole || (facets == 0 && bytes.size() > kFacets)) return std::nullopt;
     return facets;
+}
+
+std::uint64_t bytesBehindBinaryStl(ByteSpan bytes) {
+    const auto facets = facetsOfBinaryStl(bytes);
+    return facets ? bytes.size() - kFacets - std::uint64_t{*facets} * kFacet : 0;
+}
+
+std::optional<Bytes> lowerCaseStl(ByteSpan bytes) {
+    constexpr std::size_t kHead = 4096;
+    const std::string_view head(reinterpret_cast<const char*>(bytes.data()),
+                                std::min(bytes.size(), kHead));
+    if (facetsOfBinaryStl(bytes) || head.find("FACET") == std::string_view::npos)
+        return std::nullopt;
+    Bytes lower(bytes.begin(), bytes.end());
+    for (auto& b : lower) {
+        const auto c = std::to_integer<char>(b);
+        if (c >= 'A' && c <= 'Z') b = static_cast<std::byte>(c - 'A' + 'a');
+    }
+    return lower;
 }
 
 void readStlColours(ByteSpan bytes, std::vector<glm::vec4>& colours) {
@@ -47,6 +73,8 @@ void readStlColours(ByteSpan bytes, std::vector<glm::vec4>& colours) {
         anyBits = anyBits || attributeOf(i) != 0;
     }
     if (!anyBits) return;
+    if (!object)
+        colours.assign(colours.size(), glm::vec4(glm::vec3(srgbFromLinear(kPlainGrey)), 1));
     const bool clearIsOwn = object && anyClear;
     for (std::size_t i = 0; i < *facets; ++i) {
         const std::uint16_t bits = attributeOf(i);

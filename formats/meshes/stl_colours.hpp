@@ -9,8 +9,16 @@
 
 namespace stx {
 
-/// How many facets a binary STL has; nothing when the bytes are none.
+/// How many facets a binary STL has, which may have more bytes behind them; nothing when the bytes
+/// are none.
 [[nodiscard]] std::optional<std::uint32_t> facetsOfBinaryStl(ByteSpan bytes);
+
+/// How many bytes of a binary STL are behind its last facet; 0 when the bytes are none.
+[[nodiscard]] std::uint64_t bytesBehindBinaryStl(ByteSpan bytes);
+
+/// A text STL whose keywords are in upper case with these in lower case, as Assimp wants them;
+/// nothing when they are, or when it is no text.
+[[nodiscard]] std::optional<Bytes> lowerCaseStl(ByteSpan bytes);
 
 /// The colours of the corners of a binary STL in sRGB, as the two bytes behind each facet say
 /// (Wikipedia, "STL (file format)"). `colours` has what Assimp gives, which takes bit 15 for a
@@ -19,7 +27,7 @@ namespace stx {
 /// its own, red in the lowest five bits; the others have the object's. MeshLab sets bit 15 of
 /// all facets under that header, and means their own. A file of zeros has the object's, too.
 /// VisCAM and SolidView: bit 15 is set where a facet has its own, blue in the lowest five bits; the
-/// others keep what `colours` has.
+/// others are plain grey.
 void readStlColours(ByteSpan bytes, std::vector<glm::vec4>& colours);
 
 }  // namespace stx

@@ -90,7 +90,9 @@ std::optional<Bytes> withLeadingZeros(ByteSpan bytes) {
         if (!continued) values = line.starts_with('v');
         continued = line.ends_with('\\');
         if (!values) continue;
-        for (auto at = text.find('.', start); at < end; at = text.find('.', at + 1)) {
+        // To the line's end: another point may be far away.
+        const auto upTo = text.substr(0, end);
+        for (auto at = upTo.find('.', start); at < end; at = upTo.find('.', at + 1)) {
             const bool first = at == start || isBlank(text[at - 1]);
             if (!first || at + 1 >= end || !isDigit(text[at + 1])) continue;
             append(out, text.substr(copied, at - copied));

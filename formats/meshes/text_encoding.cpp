@@ -74,4 +74,11 @@ std::string_view trimmed(std::string_view text) {
     return text.substr(first, text.find_last_not_of(blanks) - first + 1);
 }
 
+std::string_view takeWord(std::string_view& text) {
+    text = trimmed(text);
+    const auto word = text.substr(0, text.find_first_of(" \t"));
+    text = trimmed(text.substr(word.size()));
+    return word;
+}
+
 }  // namespace stx

@@ -14,6 +14,13 @@ namespace stx {
 /// Without the blanks of ASCII at both ends.
 [[nodiscard]] std::string_view trimmed(std::string_view text);
 
+/// Takes the first word off a text; empty at its end. The rest is trimmed.
+std::string_view takeWord(std::string_view& text);
+
+[[nodiscard]] inline std::string_view textOf(ByteSpan bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
 /// What is between the words of a line.
 [[nodiscard]] constexpr bool isBlank(char c) {
     return c == ' ' || c == '\t';

@@ -1,5 +1,7 @@
 #include "formats/meshes/triangulate.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 namespace stx {
@@ -39,46 +41,103 @@ void fan(std::span<const std::uint32_t> corners, std::vector<glm::uvec3>& triang
         triangles.emplace_back(corners[0], corners[i], corners[i + 1]);
 }
 
+/// The corners that are left, in squares: an ear has few in and around it.
+class CornerGrid {
+  public:
+    explicit CornerGrid(std::span<const glm::dvec2> flat) : flat_(flat) {
+        low_ = glm::dvec2(flat[0]);
+        glm::dvec2 high = low_;
+        for (const auto& p : flat) low_ = glm::min(low_, p), high = glm::max(high, p);
+        constexpr double kEach = 2;  // corners in a square, if they were spread evenly
+        side_ = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(flat.size()) / kEach)));
+        size_ = glm::max((high - low_) / static_cast<double>(side_), glm::dvec2(1e-300));
+        squares_.resize(static_cast<std::size_t>(side_) * side_);
+        for (std::uint32_t i = 0; i < flat.size(); ++i) squareOf(flat[i]).push_back(i);
+    }
+    void remove(std::uint32_t corner) {
+        auto& square = squareOf(flat_[corner]);
+        *std::ranges::find(square, corner) = square.back();
+        square.pop_back();
+    }
+    /// Whether a corner lies in the triangle. Adds to `steps` what it looked at.
+    bool anyInside(std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint64_t& steps) const {
+        const auto pa = flat_[a], pb = flat_[b], pc = flat_[c];
+        const auto first = place(glm::min(pa, glm::min(pb, pc)));
+        const auto last = place(glm::max(pa, glm::max(pb, pc)));
+        for (int y = first.y; y <= last.y; ++y)
+            for (int x = first.x; x <= last.x; ++x) {
+                const auto& square = squares_[static_cast<std::size_t>(y) * side_ + x];
+                steps += 1 + square.size();
+                for (const auto corner : square) {
+                    const auto p = flat_[corner];
+                    // Corners at the same place (a bridge to a hole) do not block.
+                    if (p != pa && p != pb && p != pc && inside(p, pa, pb, pc)) return true;
+                }
+            }
+        return false;
+    }
+
+  private:
+    [[nodiscard]] glm::ivec2 place(glm::dvec2 p) const {
+        // In this order what is no number is in the last square.
+        return glm::ivec2(glm::min(glm::dvec2(side_ - 1), (p - low_) / size_));
+    }
+    std::vector<std::uint32_t>& squareOf(glm::dvec2 p) {
+        const auto at = place(p);
+        return squares_[static_cast<std::size_t>(at.y) * side_ + at.x];
+    }
+
+    std::span<const glm::dvec2> flat_;
+    glm::dvec2 low_{0.0}, size_{1.0};  ///< of all, of a square
+    int side_ = 1;                     ///< squares
+    std::vector<std::vector<std::uint32_t>> squares_;
+};
+
 }  // namespace
 
 void triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& triangles) {
-    const auto n = corners.size();
+    const auto n = static_cast<std::uint32_t>(corners.size());
     if (n < 3) return;
-    std::vector<std::uint32_t> rest(n);
-    for (std::size_t i = 0; i < n; ++i) rest[i] = static_cast<std::uint32_t>(i);
+    std::vector<std::uint32_t> rest(n), next(n), previous(n);
+    for (std::uint32_t i = 0; i < n; ++i) {
+        rest[i] = i;
+        next[i] = (i + 1) % n;
+        previous[i] = (i + n - 1) % n;
+    }
     if (n == 3) return fan(rest, triangles);
     const auto flat = flatten(corners);
     bool convex = true;
     for (std::size_t i = 0; i < n; ++i)
         convex = convex && cross(flat[i], flat[(i + 1) % n], flat[(i + 2) % n]) >= 0;
-    // Ears cost n^2 to n^3 steps: a polygon of this many corners is an attack rather than a
-    // drawing.
-    constexpr std::size_t kMostCorners = 2048;
-    if (convex || n > kMostCorners) return fan(rest, triangles);
+    if (convex) return fan(rest, triangles);
 
-    std::size_t at = 0, misses = 0;
-    while (rest.size() > 3 && misses < rest.size()) {
-        const auto m = rest.size();
-        const auto before = rest[(at + m - 1) % m], tip = rest[at % m], after = rest[(at + 1) % m];
-        bool ear = cross(flat[before], flat[tip], flat[after]) > 0;
-        for (std::size_t i = 0; ear && i < m; ++i) {
-            const auto other = rest[i];
-            if (other == before || other == tip || other == after) continue;
-            const auto p = flat[other];
-            // Corners at the same place (a bridge to a hole) do not block.
-            if (p == flat[before] || p == flat[tip] || p == flat[after]) continue;
-            ear = !inside(p, flat[before], flat[tip], flat[after]);
-        }
-        if (ear) {
-            triangles.emplace_back(before, tip, after);
-            rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(at % m));
-            at = (at + rest.size() - 1) % rest.size();
+    // Of a drawing each ear takes a few steps, 1000 where its corners are badly spread. What takes
+    // more is an attack.
+    constexpr std::uint64_t kMostSteps = 1 << 16;  // for each corner
+    CornerGrid grid(flat);
+    std::uint32_t at = 0, left = n, misses = 0;
+    for (std::uint64_t steps = 0; left > 3 && misses < left && steps < kMostSteps * n; ++steps) {
+        const auto before = previous[at], after = next[at];
+        if (cross(flat[before], flat[at], flat[after]) > 0 &&
+            !grid.anyInside(before, at, after, steps)) {
+            triangles.emplace_back(before, at, after);
+            grid.remove(at);
+            next[before] = after;
+            previous[after] = before;
+            at = before;
+            --left;
             misses = 0;
         } else {
-            at = (at + 1) % m;
+            at = after;
             ++misses;
         }
     }
+    rest.resize(left);
+    for (auto& corner : rest) {
+        corner = at;
+        at = next[at];
+    }
+    std::rotate(rest.begin(), std::ranges::min_element(rest), rest.end());
     fan(rest, triangles);
 }
 

@@ -1,6 +1,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <limits>
 
 #include "formats/meshes/text_encoding.hpp"
 #include "formats/meshes/triangulate.hpp"
@@ -28,10 +29,7 @@ TEST(IsMesh, ByBytesThenByEnding) {
     EXPECT_FALSE(isMesh("-", bytesOf("plywood")));
 }
 
-TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
-    // A comb with three teeth, drawn in a slanted plane.
-    const std::vector<glm::vec2> outline = {{0, 0}, {6, 0}, {6, 4}, {5, 1}, {4, 4},
-                                            {3, 1}, {2, 4}, {1, 1}, {0, 4}};
+void expectTriangulated(const std::vector<glm::dvec2>& outline) {
     for (const bool reversed : {false, true}) {
         std::vector<glm::dvec3> corners;
         for (const auto& p : outline) corners.emplace_back(p.x, p.y * 0.5, p.y + p.x);
@@ -50,6 +48,28 @@ TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
     }
 }
 
+TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
+    // A comb with three teeth, drawn in a slanted plane.
+    expectTriangulated({{0, 0}, {6, 0}, {6, 4}, {5, 1}, {4, 4}, {3, 1}, {2, 4}, {1, 1}, {0, 4}});
+}
+
+TEST(Triangulate, SoDoThoseOfManyCorners) {
+    std::vector<glm::dvec2> comb = {{0, 0}, {1, 0}}, arc;
+    constexpr int kTeeth = 10000, kSteps = 3000;
+    for (int i = kTeeth; i >= 0; --i) {
+        comb.emplace_back((i + 0.5) / (kTeeth + 1), 1);
+        if (i > 0) comb.emplace_back(i / (kTeeth + 1.0), 0.25);
+    }
+    expectTriangulated(comb);
+    // The letter C.
+    for (int i = 0; i < 2 * kSteps; ++i) {
+        const bool outer = i < kSteps;
+        const double angle = (outer ? i : 2 * kSteps - 1 - i) * 5.0 / kSteps;
+        arc.push_back(glm::dvec2(std::cos(angle), std::sin(angle)) * (outer ? 1.5 : 0.9));
+    }
+    expectTriangulated(arc);
+}
+
 TEST(Triangulate, NonsenseStillEnds) {
     std::vector<glm::dvec3> corners(50, glm::dvec3(1));
     std::vector<glm::uvec3> triangles;
@@ -59,6 +79,11 @@ TEST(Triangulate, NonsenseStillEnds) {
     corners = {{0, 0, 0}, {1, 1, 0}, {1, 0, 0}, {0, 1, 0}};  // a bow tie
     triangulate(corners, triangles);
     EXPECT_EQ(triangles.size(), 2u);
+    triangles.clear();
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN(), kFar = HUGE_VAL;
+    corners = {{0, 0, 0}, {1, kNone, 0}, {kFar, 0, 0}, {0, -kFar, 0}, {0.5, 0, 1e308}};
+    triangulate(corners, triangles);
+    EXPECT_EQ(triangles.size(), 3u);
 }
 
 TEST(TextEncoding, MarkedTextBecomesUtf8) {
@@ -115,8 +140,27 @@ TEST(Stl, ColoursOfFacets) {
     EXPECT_EQ(stlColours(magics, {0, 0}), (Colours{green, green}));
     EXPECT_EQ(stlColours("viscam", {0xfc00, 0x801f, 0x8000 | 8 | 16 << 5 | 24 << 10}),
               (Colours{red, blue, glm::ivec3(197, 132, 66)}));
-    EXPECT_EQ(stlColours("viscam", {0xfc00, 0}), (Colours{red, glm::ivec3(153)}));
+    EXPECT_EQ(stlColours("viscam", {0xfc00, 0}), (Colours{red, plain}));
     EXPECT_EQ(stlColours("plain", {0, 0x7fff}), (Colours{plain, plain}));
+}
+
+TEST(Stl, BytesBehindTheLastFacetAreSaidToBeDropped) {
+    std::string stl(80 + 4 + 50, '\0');
+    stl[80] = 1;
+    const float corners[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    std::memcpy(stl.data() + 84 + 12, corners, sizeof(corners));
+    EXPECT_FALSE(readGoodText(stl, "a.stl").hasNote("facet"));
+    const auto more = readGoodText(stl + "xy", "a.stl");
+    EXPECT_EQ(more.mesh.triangles.size(), 1u);
+    EXPECT_TRUE(more.hasNote("dropped: what is behind the last facet (2 bytes)"));
+}
+
+TEST(Stl, KeywordsMayBeInUpperCase) {
+    const std::string text =
+        "SOLID X\nFACET NORMAL 0 0 1\n OUTER LOOP\n  VERTEX -.5 -.5 0\n  VERTEX 5E-1 -.5 0\n  "
+        "VERTEX .5 .5 0\n ENDLOOP\nENDFACET\nENDSOLID X\n";
+    EXPECT_EQ(readGoodText(text, "a.stl").mesh.triangles.size(), 1u);
+    EXPECT_EQ(readGoodText(text, "-").mesh.bounds().max, glm::dvec3(0.5, 0.5, 0));
 }
 
 TEST(Obj, VRunsDownInMeshAndKdIsSrgb) {
@@ -196,6 +240,35 @@ TEST(Ply, FaceColoursAndStrips) {
     }
 }
 
+TEST(Ply, FacesMayComeBeforeTheirVertices) {
+    const std::string faces =
+        "ply\nformat ascii 1.0\nelement face 2\nproperty list uchar int vertex_indices\nelement "
+        "vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty float s\n"
+        "property float t\nend_header\n";
+    const std::string vertices = "0 0 0 0 0\n1 0 0 0.5 0\n1 1 0 1 1\n0 1 0 0 1\n";
+    const auto model = readGoodText(faces + "3 0 1 2\n3 0 2 3\n" + vertices, "a.ply").mesh;
+    ASSERT_EQ(model.triangles.size(), 2u);
+    EXPECT_EQ(model.positions[model.triangles[1].z], glm::vec3(0, 1, 0));
+    EXPECT_EQ(model.uvs.at(model.triangles[0].y), glm::vec2(0.5f, 1));
+    EXPECT_NE(readBadText(faces + "3 0 1 4\n3 0 2 3\n" + vertices, "a.ply")
+                  .text()
+                  .find("uses vertex 4, but there are only 4 vertices"),
+              std::string::npos);
+}
+
+TEST(Ply, ColoursOfFacesBesideThoseOfVerticesAreSaidToBeDropped) {
+    const auto model = readGoodText(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+        "float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n"
+        "property list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\n"
+        "property uchar blue\nend_header\n0 0 0 0 0 255\n1 0 0 0 0 255\n1 1 0 0 0 255\n"
+        "3 0 1 2 255 0 0\n",
+        "a.ply");
+    EXPECT_EQ(model.mesh.colours.at(0), glm::vec4(0, 0, 1, 1));
+    EXPECT_TRUE(
+        model.hasNote("dropped: the colours of PLY faces; those of the vertices are drawn"));
+}
+
 TEST(Clouds, PointsThatAreNowhereAreSkippedAndCounted) {
     const std::string header =
         "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty "
@@ -218,6 +291,63 @@ TEST(Clouds, PointsThatAreNowhereAreSkippedAndCounted) {
     gltf.root["meshes"][0]["primitives"].push_back(
         {{"attributes", {{"POSITION", position}}}, {"mode", 0}});
     EXPECT_EQ(readGoodText(gltf.text(), "a.gltf").mesh.points.size(), 2u);
+}
+
+/// The colour of each point, as sRGB.
+std::vector<glm::ivec3> pointColours(const ReadModel& model) {
+    std::vector<glm::ivec3> out;
+    for (const auto p : model.mesh.points) {
+        glm::ivec3 c(255);
+        if (!model.mesh.colours.empty())
+            for (int k = 0; k < 3; ++k)
+                c[k] =
+                    static_cast<int>(std::lround(srgbFromLinear(model.mesh.colours[p][k]) * 255));
+        out.push_back(c);
+    }
+    return out;
+}
+
+TEST(Clouds, PointsHaveTheColourOfTheirMaterial) {
+    using Colours = std::vector<glm::ivec3>;
+    const glm::ivec3 red(255, 0, 0), grey(188);
+    TemporaryFolder folder;
+    write(folder / "a.mtl", "newmtl red\nKd 1 0 0\n");
+    write(folder / "a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nusemtl red\np 1 2\n");
+    EXPECT_EQ(pointColours(readGood(folder / "a.obj")), (Colours{red, red}));
+
+    GltfText gltf;
+    const int position = gltf.accessor(std::vector<float>{0, 0, 0, 1, 0, 0}, 5126, "VEC3", 2);
+    const int colour = gltf.accessor(std::vector<float>{1, 1, 1, 0, 1, 1}, 5126, "VEC3", 2);
+    gltf.root["materials"] = {{{"pbrMetallicRoughness", {{"baseColorFactor", {1, 0, 0, 1}}}}},
+                              {{"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}}},
+                               {"emissiveFactor", {1, 0, 0}}}};
+    auto& primitives = gltf.root["meshes"][0]["primitives"];
+    primitives.push_back({{"attributes", {{"POSITION", position}, {"COLOR_0", colour}}},
+                          {"mode", 0},
+                          {"material", 0}});
+    primitives.push_back({{"attributes", {{"POSITION", position}}}, {"mode", 0}, {"material", 1}});
+    EXPECT_EQ(pointColours(readGoodText(gltf.text(), "a.gltf")),
+              (Colours{red, glm::ivec3(0), red, red}));
+
+    const auto plain = readGoodText(
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty "
+        "float z\nend_header\n0 0 0\n",
+        "a.ply");
+    EXPECT_EQ(pointColours(plain), Colours{grey});
+    EXPECT_TRUE(plain.hasNote("it is drawn in plain grey"));
+    EXPECT_EQ(pointColours(readGoodText("v 0 0 0\nv 1 0 0\n", "a.obj")), (Colours{grey, grey}));
+}
+
+TEST(Clouds, ATextureOfPointsIsSaidToBeDropped) {
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.addTexture();
+    gltf.root["materials"] = {
+        {{"name", "a"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+    gltf.primitive()["material"] = 0;
+    gltf.primitive()["mode"] = 0;
+    EXPECT_TRUE(readGoodText(gltf.text(), "a.gltf")
+                    .hasNote("the texture of material 'a' is not drawn on points"));
 }
 
 class WritePoints : public testing::Test {

@@ -1,14 +1,18 @@
 #pragma once
 
 #include <cstring>
+#include <fstream>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "formats/images/images.hpp"
 #include "formats/meshes/meshes.hpp"
+#include "lib/capture/material_sampler.hpp"
 #include "tests/shared_data.hpp"
+#include "tests/temporary_folder.hpp"
 
 namespace stx {
 
@@ -57,6 +61,34 @@ inline Error readBadText(const std::string& text, const std::string& name, Limit
         return {};
     }
     return mesh.error();
+}
+
+inline void write(const std::filesystem::path& file, const std::string& text) {
+    std::ofstream(file, std::ios::binary) << text;
+}
+
+/// A 2 x 1 picture.
+inline void writePair(const std::filesystem::path& file, glm::u8vec4 left, glm::u8vec4 right) {
+    Rgba8Image image(2, 1);
+    image.at(0, 0) = left;
+    image.at(1, 0) = right;
+    const auto png = encodePng(2, 1, 4, 8, image.data(), true);
+    ASSERT_TRUE(png);
+    ASSERT_TRUE(writeFile(file, *png));
+}
+
+/// The middle of the first triangle.
+inline glm::vec4 colourOf(const Mesh& mesh) {
+    return MaterialSampler(mesh).colour(0, glm::vec3(1.0f / 3.0f));
+}
+
+/// A triangle with a material of these lines.
+inline ReadModel objWith(const TemporaryFolder& folder, const std::string& material) {
+    write(folder / "a.mtl", "newmtl paint\n" + material);
+    write(folder / "a.obj",
+          "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl paint\n"
+          "f 1/1 2/2 3/3\n");
+    return readGood(folder / "a.obj");
 }
 
 inline std::string base64(const std::vector<unsigned char>& bytes) {
