@@ -59,6 +59,7 @@ class SceneConverter {
         saysUndefined_ = format == AssimpFormat::obj && !files.replacesColour() &&
                          (side.missing().empty() || !side.texts().empty());
         builder_.setOrigin(origin);
+        if (format == AssimpFormat::dae || format == AssimpFormat::fbx) builder_.setRounded();
     }
 
     Result<Mesh> convert() {
