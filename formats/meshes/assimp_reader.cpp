@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <new>
-#include <set>
 
 #include "formats/meshes/alpha_map.hpp"
 #include "formats/meshes/collada_text.hpp"
+#include "formats/meshes/fbx_scene.hpp"
 #include "formats/meshes/foreign_scene.hpp"
 #include "formats/meshes/mesh_builder.hpp"
 #include "formats/meshes/mtl_notes.hpp"
@@ -36,8 +36,6 @@ const char* endingOf(AssimpFormat format) {
 using decoders::Tag;
 using models::TextureUse;
 
-/// Assimp's name of the material of what has none.
-constexpr std::string_view kUnnamed = "DefaultMaterial";
 constexpr int kMostModelSeconds = 120;
 #ifdef __SANITIZE_ADDRESS__
 /// AddressSanitizer waits for ever where it has no memory to say that there is none.
@@ -76,9 +74,11 @@ class SceneConverter {
         for (std::size_t i = 0; i < scene_.nodes.size(); ++i)
             for (const std::uint32_t mesh : scene_.nodes[i].meshes)
                 STX_CHECK(convertMesh(scene_.meshes[mesh], worldFromNode_[i]));
-        if (scene_.animations > 0)
-            files_.job().note(fmt::format("dropped: animations ({})", scene_.animations));
-        if (lines_ > 0) files_.job().note(fmt::format("dropped: lines ({})", lines_));
+        for (const auto& [count, what] : {std::pair{std::size_t{scene_.animations}, "animations"},
+                                          {std::size_t{scene_.cameras}, "cameras"},
+                                          {std::size_t{scene_.lights}, "lights"},
+                                          {lines_, "lines"}})
+            if (count > 0) files_.job().note(fmt::format("dropped: {} ({})", what, count));
         if (points_ > 0)
             files_.job().note(fmt::format("dropped: points in a mesh of triangles ({})", points_));
         return builder_.finish();
@@ -91,7 +91,7 @@ class SceneConverter {
         Material m;
         m.name = source.name;
         const auto known = mtl_.find(m.name);
-        const MtlMaterial mtl = known == mtl_.end() ? MtlMaterial{} : known->second;
+        MtlMaterial mtl = known == mtl_.end() ? MtlMaterial{} : known->second;
 
         const bool hasMap = textureOf(source, Use::diffuse).has_value();
         // Assimp invents a grey where the file says nothing.
@@ -141,28 +141,44 @@ class SceneConverter {
             if (has)
                 files_.job().note(fmt::format("material '{}': its {} is dropped", m.name, label));
         }
-        noteUvSets(source);
+        placeUvs(source, mtl);
         builder_.materials().push_back(std::move(m));
         mtlOf_.push_back(mtl);
         return {};
     }
 
-    void noteUvSets(const ForeignScene::Material& source) {
-        std::set<std::uint32_t> sets;
-        for (const auto& texture : source.textures)
-            if (texture) sets.insert(texture->uvSet);
-        if (sets.size() > 1)
-            files_.job().note(fmt::format(
-                "material '{}': its maps have several sets of texture coordinates; all are drawn "
-                "with that of the first",
-                source.name));
+    /// All maps are drawn with the coordinates of the first: with its set, scaled and moved as it
+    /// says.
+    void placeUvs(const ForeignScene::Material& source, MtlMaterial& mtl) {
+        const ForeignScene::Texture* first = nullptr;
+        bool otherSet = false, otherPlace = false;
+        for (const auto& texture : source.textures) {
+            if (!texture) continue;
+            if (!first) first = &*texture;
+            otherSet = otherSet || texture->uvSet != first->uvSet;
+            otherPlace = otherPlace || texture->uvScale != first->uvScale ||
+                         texture->uvOffset != first->uvOffset;
+        }
+        if (!first) return;
+        const auto note = [&](std::string_view what) {
+            files_.job().note(fmt::format("material '{}': {}", source.name, what));
+        };
+        if (otherSet)
+            note(
+                "its maps have several sets of texture coordinates; all are drawn with that of the "
+                "first");
+        if (otherPlace)
+            note("its maps are scaled or moved unlike each other; all are drawn as the first");
+        if (first->uvRotationRad != 0) note("the rotation of its maps is not read");
+        mtl.uvScale *= first->uvScale;
+        mtl.uvOffset = mtl.uvOffset * first->uvScale + first->uvOffset;
     }
 
     /// Materials that a `usemtl` names and no material file has.
     void noteUndefined() {
         std::vector<std::string> names;
         for (const auto& material : scene_.materials)
-            if (material.name != kUnnamed && !mtl_.contains(material.name))
+            if (material.name != models::kUnnamedMaterial && !mtl_.contains(material.name))
                 names.push_back(material.name);
         if (names.empty()) return;
         const bool one = names.size() == 1;
@@ -465,6 +481,7 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         (void)process->send(Tag::readModel, request.bytes);
         SideFiles side(files);
         STX_TRY(auto scene, hear(*process, format, side, limits));
+        if (format == AssimpFormat::fbx) STX_CHECK(completeFbx(bytes, scene, files.job()));
         if (format == AssimpFormat::stl && scene.meshes.size() == 1)
             readStlColours(bytes, scene.meshes[0].colours);
         if (!side.missing().empty() && side.texts().empty())
