@@ -481,6 +481,9 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         (void)process->send(Tag::readModel, request.bytes);
         SideFiles side(files);
         STX_TRY(auto scene, hear(*process, format, side, limits));
+        if (format == AssimpFormat::dae)
+            for (auto& material : scene.materials)
+                if (material.diffuse && material.diffuse->r == kNoColour) material.diffuse.reset();
         if (format == AssimpFormat::fbx) STX_CHECK(completeFbx(bytes, scene, files.job()));
         if (format == AssimpFormat::stl && scene.meshes.size() == 1)
             readStlColours(bytes, scene.meshes[0].colours);
@@ -491,6 +494,16 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
             files.job().note(fmt::format(
                 "wrap '{}' of samplers is not read, only WRAP, CLAMP and MIRROR: textures repeat",
                 collada.wrap));
+        if (!collada.twoSkeletons.empty())
+            files.job().note(fmt::format(
+                "skin '{}' is shown with several skeletons; all have the pose of the first",
+                collada.twoSkeletons));
+        if (collada.morphs > 0)
+            files.job().note(fmt::format("dropped: morphs ({}); what they morph has its base shape",
+                                         collada.morphs));
+        if (collada.holes > 0)
+            files.job().note(
+                fmt::format("holes of polygons are not read: {} are filled", collada.holes));
         if (!collada.boundTwice.empty())
             files.job().note(fmt::format(
                 "'{}' is bound to several sets of texture coordinates; all textures have the first",
