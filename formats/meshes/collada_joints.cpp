@@ -29,6 +29,13 @@ void ColladaJoints::read(std::string_view text, std::size_t at) {
         controller_ = collada::attributeOf(tag, "id");
     } else if (name == "/controller") {
         controller_ = {};
+    } else if (name == "skin") {
+        skin_ = at;
+    } else if (name == "bind_shape_matrix") {
+        skin_ = kNowhere;
+    } else if (name == "/skin") {
+        if (skin_ != kNowhere) withoutShape_.insert(skin_);
+        skin_ = kNowhere;
     } else if (name == "Name_array" && !controller_.empty()) {
         auto& names = skins_[controller_].names;
         if (names.empty()) names = collada::contentOf(tag, name);
@@ -76,17 +83,23 @@ void ColladaJoints::resolve() {
     }
 }
 
-std::optional<ColladaJoints::Renamed> ColladaJoints::renamedAt(std::string_view text,
-                                                               std::size_t at) const {
+std::optional<ColladaJoints::Replaced> ColladaJoints::replacedAt(std::string_view text,
+                                                                 std::size_t at) const {
     const auto tag = text.substr(at);
     const auto name = collada::nameOf(tag);
+    if (name == "skin" && withoutShape_.contains(at)) {
+        const auto inside = collada::endOfTag(text, at);
+        return Replaced{inside, inside,
+                        "<bind_shape_matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</bind_shape_matrix>"};
+    }
     const bool isNode = name == "node";
     if (!isNode && name != "Name_array") return std::nullopt;
     const auto old = isNode ? collada::attributeOf(tag, "sid") : collada::contentOf(tag, name);
+    if (old.empty()) return std::nullopt;
     const auto& all = isNode ? sids_ : arrays_;
     const auto known = all.find(static_cast<std::size_t>(old.data() - text.data()));
-    if (old.empty() || known == all.end()) return std::nullopt;
-    return Renamed{known->first, known->first + old.size(), known->second};
+    if (known == all.end()) return std::nullopt;
+    return Replaced{known->first, known->first + old.size(), known->second};
 }
 
 }  // namespace stx

@@ -382,7 +382,7 @@ Result<PlainCollada> plainCollada(ByteSpan bytes) {
         out.text += with;
         copied = to;
     };
-    bool inMorph = false;
+    bool inMorph = false, hasHoles = false;
     // What is an instance, or a skin, of a morph becomes that of its base.
     const auto replaceMorph = [&](std::size_t at) {
         const auto tag = text.substr(at);
@@ -405,28 +405,23 @@ Result<PlainCollada> plainCollada(ByteSpan bytes) {
     STX_CHECK(collada::eachTag(text, [&](std::size_t at) -> Result<void> {
         if (at < copied) return {};
         const auto tag = text.substr(at);
+        const auto element = collada::nameOf(tag);
         std::size_t readTo = at;
         if (const auto colour = colours.read(text, at, readTo)) replace(at, readTo, *colour);
         replaceMorph(at);
-        if (collada::nameOf(tag) == "skin") {
-            const auto inside = collada::endOfTag(text, at);
-            const auto skin = text.substr(at, collada::endOfElement(text, at) - at);
-            if (skin.find("<bind_shape_matrix") == std::string_view::npos)
-                replace(inside, inside,
-                        "<bind_shape_matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</bind_shape_matrix>");
-        }
-        if (const auto renamed = joints.renamedAt(text, at))
-            replace(renamed->from, renamed->to, renamed->with);
-        if (collada::nameOf(tag) == "ph" || collada::nameOf(tag) == "/ph") {
+        if (const auto joint = joints.replacedAt(text, at))
+            replace(joint->from, joint->to, joint->with);
+        if (element == "ph" || element == "/ph") {
+            hasHoles = element == "ph";
             replace(at, collada::endOfTag(text, at), "");
             return {};
         }
-        if (collada::nameOf(tag) == "h") {
+        if (hasHoles && element == "h") {
             ++out.holes;
             replace(at, collada::endOfElement(text, at), "");
             return {};
         }
-        if (collada::nameOf(tag) == "effect") {
+        if (element == "effect") {
             wraps.clear();
             effect = collada::attributeOf(tag, "id");
         }
