@@ -204,6 +204,8 @@ class FactsReader {
                     "ByPolygonVertex or ByVertice",
                     object.name, object.colours));
         }
+        // Assimp 5.2.5 leaves the others' materials out, and its option to read all
+        // (AI_CONFIG_IMPORT_FBX_READ_ALL_MATERIALS) fails at every file.
         std::set<std::int64_t> noted;
         for (const auto model : ids_) {
             std::vector<std::int64_t> materials;
