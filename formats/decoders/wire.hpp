@@ -17,7 +17,7 @@
 namespace stx::decoders {
 
 /// Changes with every change of what is said.
-inline constexpr std::uint32_t kWireVersion = 4;
+inline constexpr std::uint32_t kWireVersion = 5;
 inline constexpr std::uint32_t kMagic = 0x57585453 + (kWireVersion << 24);  ///< "STX", version
 
 enum class Tag : std::uint32_t {

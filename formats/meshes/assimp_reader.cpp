@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <new>
-#include <set>
 
 #include "formats/meshes/alpha_map.hpp"
 #include "formats/meshes/collada_text.hpp"
+#include "formats/meshes/fbx_scene.hpp"
 #include "formats/meshes/foreign_scene.hpp"
 #include "formats/meshes/mesh_builder.hpp"
 #include "formats/meshes/mtl_notes.hpp"
@@ -37,8 +37,6 @@ const char* endingOf(AssimpFormat format) {
 using decoders::Tag;
 using models::TextureUse;
 
-/// Assimp's name of the material of what has none.
-constexpr std::string_view kUnnamed = "DefaultMaterial";
 constexpr int kMostModelSeconds = 120;
 #ifdef __SANITIZE_ADDRESS__
 /// AddressSanitizer waits for ever where it has no memory to say that there is none.
@@ -61,6 +59,7 @@ class SceneConverter {
         saysUndefined_ = format == AssimpFormat::obj && !files.replacesColour() &&
                          (side.missing().empty() || side.hasMaterialFile());
         builder_.setOrigin(origin);
+        if (format == AssimpFormat::dae || format == AssimpFormat::fbx) builder_.setRounded();
     }
 
     Result<Mesh> convert() {
@@ -77,9 +76,11 @@ class SceneConverter {
         for (std::size_t i = 0; i < scene_.nodes.size(); ++i)
             for (const std::uint32_t mesh : scene_.nodes[i].meshes)
                 STX_CHECK(convertMesh(scene_.meshes[mesh], worldFromNode_[i]));
-        if (scene_.animations > 0)
-            files_.job().note(fmt::format("dropped: animations ({})", scene_.animations));
-        if (lines_ > 0) files_.job().note(fmt::format("dropped: lines ({})", lines_));
+        for (const auto& [count, what] : {std::pair{std::size_t{scene_.animations}, "animations"},
+                                          {std::size_t{scene_.cameras}, "cameras"},
+                                          {std::size_t{scene_.lights}, "lights"},
+                                          {lines_, "lines"}})
+            if (count > 0) files_.job().note(fmt::format("dropped: {} ({})", what, count));
         if (points_ > 0)
             files_.job().note(fmt::format("dropped: points in a mesh of triangles ({})", points_));
         return builder_.finish();
@@ -92,7 +93,7 @@ class SceneConverter {
         Material m;
         m.name = source.name;
         const auto known = mtl_.find(m.name);
-        const MtlMaterial mtl = known == mtl_.end() ? MtlMaterial{} : known->second;
+        MtlMaterial mtl = known == mtl_.end() ? MtlMaterial{} : known->second;
 
         const bool hasMap = textureOf(source, Use::diffuse).has_value();
         // Assimp invents a grey where the file says nothing.
@@ -143,7 +144,7 @@ class SceneConverter {
             if (has)
                 files_.job().note(fmt::format("material '{}': its {} is dropped", m.name, label));
         }
-        noteUvSets(source);
+        placeUvs(source, mtl);
         if (bare_.contains(m.name) &&
             std::ranges::any_of(source.textures, [](const auto& t) { return t.has_value(); }))
             files_.job().note(fmt::format(
@@ -155,22 +156,38 @@ class SceneConverter {
         return {};
     }
 
-    void noteUvSets(const ForeignScene::Material& source) {
-        std::set<std::uint32_t> sets;
-        for (const auto& texture : source.textures)
-            if (texture) sets.insert(texture->uvSet);
-        if (sets.size() > 1)
-            files_.job().note(fmt::format(
-                "material '{}': its maps have several sets of texture coordinates; all are drawn "
-                "with that of the first",
-                source.name));
+    /// All maps are drawn with the coordinates of the first: with its set, scaled and moved as it
+    /// says.
+    void placeUvs(const ForeignScene::Material& source, MtlMaterial& mtl) {
+        const ForeignScene::Texture* first = nullptr;
+        bool otherSet = false, otherPlace = false;
+        for (const auto& texture : source.textures) {
+            if (!texture) continue;
+            if (!first) first = &*texture;
+            otherSet = otherSet || texture->uvSet != first->uvSet;
+            otherPlace = otherPlace || texture->uvScale != first->uvScale ||
+                         texture->uvOffset != first->uvOffset;
+        }
+        if (!first) return;
+        const auto note = [&](std::string_view what) {
+            files_.job().note(fmt::format("material '{}': {}", source.name, what));
+        };
+        if (otherSet)
+            note(
+                "its maps have several sets of texture coordinates; all are drawn with that of the "
+                "first");
+        if (otherPlace)
+            note("its maps are scaled or moved unlike each other; all are drawn as the first");
+        if (first->uvRotationRad != 0) note("the rotation of its maps is not read");
+        mtl.uvScale *= first->uvScale;
+        mtl.uvOffset = mtl.uvOffset * first->uvScale + first->uvOffset;
     }
 
     /// Materials that a `usemtl` names and no material file has.
     void noteUndefined() {
         std::vector<std::string> names;
         for (const auto& material : scene_.materials)
-            if (material.name != kUnnamed && !mtl_.contains(material.name))
+            if (material.name != models::kUnnamedMaterial && !mtl_.contains(material.name))
                 names.push_back(material.name);
         if (names.empty()) return;
         const bool one = names.size() == 1;
@@ -488,6 +505,10 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         (void)process->send(Tag::readModel, request.bytes);
         SideFiles side(files);
         STX_TRY(auto scene, hear(*process, format, side, limits));
+        if (format == AssimpFormat::dae)
+            for (auto& material : scene.materials)
+                if (material.diffuse && material.diffuse->r == kNoColour) material.diffuse.reset();
+        if (format == AssimpFormat::fbx) STX_CHECK(completeFbx(bytes, scene, files.job()));
         if (format == AssimpFormat::stl && scene.meshes.size() == 1)
             readStlColours(bytes, scene.meshes[0].colours);
         if (!side.missing().empty() && !side.hasMaterialFile())
@@ -497,6 +518,16 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
             files.job().note(fmt::format(
                 "wrap '{}' of samplers is not read, only WRAP, CLAMP and MIRROR: textures repeat",
                 collada.wrap));
+        if (!collada.twoSkeletons.empty())
+            files.job().note(fmt::format(
+                "skin '{}' is shown with several skeletons; all have the pose of the first",
+                collada.twoSkeletons));
+        if (collada.morphs > 0)
+            files.job().note(fmt::format("dropped: morphs ({}); what they morph has its base shape",
+                                         collada.morphs));
+        if (collada.holes > 0)
+            files.job().note(
+                fmt::format("holes of polygons are not read: {} are filled", collada.holes));
         if (!collada.boundTwice.empty())
             files.job().note(fmt::format(
                 "'{}' is bound to several sets of texture coordinates; all textures have the first",

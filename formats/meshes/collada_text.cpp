@@ -13,9 +13,12 @@
 #include <fmt/format.h>
 #include <glm/glm.hpp>
 
+#include "formats/meshes/collada_joints.hpp"
+#include "formats/meshes/collada_tags.hpp"
 #include "formats/meshes/text_encoding.hpp"
 
 namespace stx {
+
 namespace {
 
 /// As many numbers as there are places, and nothing else.
@@ -67,55 +70,6 @@ Result<std::optional<glm::dmat4>> skew(std::string_view values) {
                     trimmed(values));
     const double shift = (sine * std::sin(angle) + cosine * std::cos(angle)) / left - cosine / sine;
     return glm::dmat4(glm::dmat3(1.0) + glm::outerProduct(along, aside / sine) * shift);
-}
-
-/// Calls visit(at) for each element's start and end; comments are passed over. Errors: of visit.
-template <class Visit>
-Result<void> eachTag(std::string_view text, const Visit& visit) {
-    for (auto at = text.find('<'); at != std::string_view::npos; at = text.find('<', at + 1)) {
-        if (text.substr(at).starts_with("<!--")) {
-            at = text.find("-->", at);
-            if (at == std::string_view::npos) break;
-        } else {
-            STX_CHECK(visit(at));
-        }
-    }
-    return {};
-}
-
-/// The name of the element whose start or end, with '/', `text` begins with.
-std::string_view nameOf(std::string_view text) {
-    return text.substr(1, text.find_first_of("/<> \t\r\n", 2) - 1);
-}
-
-/// What is between the tags, where `text` begins with an element of this name and nothing else is
-/// in it; else empty.
-std::string_view contentOf(std::string_view text, std::string_view name) {
-    if (nameOf(text) != name) return {};
-    const auto close = text.find('<', 1);
-    if (close == std::string_view::npos) return {};
-    const auto open = text.substr(0, close).find('>');
-    const auto end = text.substr(close);
-    if (open == std::string_view::npos || !end.starts_with("</") || nameOf(end.substr(1)) != name)
-        return {};
-    return text.substr(open + 1, close - open - 1);
-}
-
-/// The value of an attribute in the tag that `text` begins with; empty without one.
-std::string_view attributeOf(std::string_view text, std::string_view name) {
-    const auto tag = text.substr(0, text.find_first_of("<>", 1));
-    const auto fromWord = [](std::string_view rest) {
-        return rest.substr(std::min(rest.find_first_not_of(" \t\r\n"), rest.size()));
-    };
-    for (auto at = tag.find(name); at != std::string_view::npos; at = tag.find(name, at + 1)) {
-        const auto value = fromWord(tag.substr(at + name.size()));
-        if (trimmed(tag.substr(at - 1, 1)).empty() && value.starts_with('=')) {
-            const auto quoted = fromWord(value.substr(1));
-            if (quoted.empty()) return {};
-            return quoted.substr(1, quoted.find(quoted[0], 1) - 1);
-        }
-    }
-    return {};
 }
 
 std::uint32_t numberIn(std::string_view digits) {
@@ -185,19 +139,19 @@ void TextureSets::read(std::string_view text, std::size_t at) {
     constexpr std::string_view kParts[] = {"triangles", "trifans", "tristrips", "polylist",
                                            "polygons",  "lines",   "linestrips"};
     const auto tag = text.substr(at);
-    const auto name = nameOf(tag);
+    const auto name = collada::nameOf(tag);
     const auto reference = [&](std::string_view attribute) {
-        auto id = attributeOf(tag, attribute);
+        auto id = collada::attributeOf(tag, attribute);
         if (id.starts_with('#')) id.remove_prefix(1);
         return id;
     };
-    if (name == "effect") effect_ = attributeOf(tag, "id");
-    if (name == "material") material_ = attributeOf(tag, "id");
-    if (name == "controller") controller_ = attributeOf(tag, "id");
-    if (name == "geometry") geometry_ = attributeOf(tag, "id");
+    if (name == "effect") effect_ = collada::attributeOf(tag, "id");
+    if (name == "material") material_ = collada::attributeOf(tag, "id");
+    if (name == "controller") controller_ = collada::attributeOf(tag, "id");
+    if (name == "geometry") geometry_ = collada::attributeOf(tag, "id");
     if (name == "texture") {
         auto& names = names_[effect_];
-        const auto texcoord = attributeOf(tag, "texcoord");
+        const auto texcoord = collada::attributeOf(tag, "texcoord");
         if (!texcoord.empty() && names.size() < kMostNames &&
             std::ranges::find(names, texcoord) == names.end())
             names.push_back(texcoord);
@@ -206,21 +160,23 @@ void TextureSets::read(std::string_view text, std::size_t at) {
     if (name == "skin" || name == "morph") skinned_.emplace(controller_, reference("source"));
     if (name == "instance_geometry" || name == "instance_controller") instance_ = reference("url");
     if (name == "instance_material")
-        instances_.push_back({instance_, attributeOf(tag, "symbol"), reference("target"), {}});
+        instances_.push_back(
+            {instance_, collada::attributeOf(tag, "symbol"), reference("target"), {}});
     if (name == "bind_vertex_input" && !instances_.empty()) bind(tag);
     if (std::ranges::find(kParts, name) != std::end(kParts)) {
-        parts_.push_back({geometry_, attributeOf(tag, "material"), {}});
+        parts_.push_back({geometry_, collada::attributeOf(tag, "material"), {}});
         inPart_ = true;
     }
     if (name.starts_with('/') && std::ranges::find(kParts, name.substr(1)) != std::end(kParts))
         inPart_ = false;
-    if (inPart_ && name == "input" && attributeOf(tag, "semantic") == "TEXCOORD")
-        parts_.back().inputs.emplace_back(numberIn(attributeOf(tag, "set")), at);
+    if (inPart_ && name == "input" && collada::attributeOf(tag, "semantic") == "TEXCOORD")
+        parts_.back().inputs.emplace_back(numberIn(collada::attributeOf(tag, "set")), at);
 }
 
 void TextureSets::bind(std::string_view text) {
-    const auto set = numberIn(attributeOf(text, "input_set"));
-    const auto [bound, isNew] = instances_.back().sets.emplace(attributeOf(text, "semantic"), set);
+    const auto set = numberIn(collada::attributeOf(text, "input_set"));
+    const auto [bound, isNew] =
+        instances_.back().sets.emplace(collada::attributeOf(text, "semantic"), set);
     if (!isNew && bound->second != set && boundTwice_.empty()) boundTwice_ = bound->first;
 }
 
@@ -282,17 +238,129 @@ void TextureSets::plan(const Part& part, const std::vector<std::uint32_t>& bound
         if (auto& sets = sets_[at]; sets.empty()) sets.push_back(number++);
 }
 
+/// The same without the prefix that the root's name has, if any.
+std::string withoutPrefix(std::string_view text) {
+    std::string prefix;
+    std::string out;
+    std::size_t copied = 0;
+    (void)collada::eachTag(text, [&](std::size_t at) -> Result<void> {
+        const auto name = collada::nameOf(text.substr(at));
+        if (prefix.empty() && name.ends_with(":COLLADA"))
+            prefix = name.substr(0, name.find(':') + 1);
+        const std::size_t slash = name.starts_with('/') ? 1 : 0;
+        if (prefix.empty() || !name.substr(slash).starts_with(prefix)) return {};
+        const auto from = at + 1 + slash;
+        out += text.substr(copied, from - copied);
+        copied = from + prefix.size();
+        return {};
+    });
+    out += text.substr(copied);
+    return out;
+}
+
+/// The colours of an effect: what parameters are, and what is missing.
+class EffectColours {
+  public:
+    /// What is to be put in place of `text` from its start to `end`, or nothing, for each tag.
+    std::optional<std::string> read(std::string_view text, std::size_t at, std::size_t& end) {
+        constexpr std::string_view kShaders[] = {"constant", "lambert", "phong", "blinn"};
+        const auto tag = text.substr(at);
+        const auto name = collada::nameOf(tag);
+        if (name == "effect") parameters_.clear();
+        if (name == "newparam") parameter_ = collada::attributeOf(tag, "sid");
+        for (const auto& [type, form] : {std::pair{"float4", "<color>{}</color>"},
+                                         {"float3", "<color>{} 1</color>"},
+                                         {"float", "<float>{}</float>"}})
+            if (const auto value = collada::contentOf(tag, type); !value.empty() && !inShader_)
+                parameters_[parameter_] = fmt::format(fmt::runtime(form), value);
+        end = at;
+        if (std::ranges::find(kShaders, name) != std::end(kShaders)) {
+            diffuse_ = emits_ = false;
+            inShader_ = true;
+            const auto close = collada::endOfTag(text, at);
+            if (!text.substr(0, close).ends_with("/>")) return std::nullopt;
+            inShader_ = false;
+            end = close;
+            return fmt::format("<{0}>{1}</{0}>", name, missing(name).value_or(""));
+        }
+        if (!inShader_) return std::nullopt;
+        if (name.starts_with('/') &&
+            std::ranges::find(kShaders, name.substr(1)) != std::end(kShaders)) {
+            inShader_ = false;
+            return missing(name.substr(1));
+        }
+        if (name == "diffuse" || name == "emission" || name == "ambient" || name == "specular" ||
+            name == "reflective" || name == "transparent")
+            property_ = name;
+        std::optional<std::string> instead;
+        if (name == "param") {
+            const auto known = parameters_.find(collada::attributeOf(tag, "ref"));
+            if (known == parameters_.end()) return std::nullopt;
+            instead = known->second;
+            end = collada::endOfElement(text, at);
+        } else if (name != "color" && name != "texture") {
+            return std::nullopt;
+        }
+        diffuse_ = diffuse_ || property_ == "diffuse";
+        emits_ = emits_ || property_ == "emission";
+        return instead;
+    }
+
+  private:
+    [[nodiscard]] std::optional<std::string> missing(std::string_view shader) const {
+        if (diffuse_) return std::nullopt;
+        const float value = shader == "constant" && emits_ ? 0.0f : kNoColour;
+        return fmt::format("<diffuse><color>{0} {0} {0} 1</color></diffuse>", value);
+    }
+
+    std::map<std::string_view, std::string> parameters_;  ///< elements of their values, by sid
+    std::string_view parameter_, property_;               ///< that is open
+    bool inShader_ = false, diffuse_ = false, emits_ = false;
+};
+
+/// Controllers that are morphs, and the geometries that they morph, by id.
+class Morphs {
+  public:
+    void read(std::string_view text, std::size_t at) {
+        const auto tag = text.substr(at);
+        if (collada::nameOf(tag) == "controller") controller_ = collada::attributeOf(tag, "id");
+        if (collada::nameOf(tag) == "morph") {
+            auto source = collada::attributeOf(tag, "source");
+            if (source.starts_with('#')) source.remove_prefix(1);
+            bases_.emplace(controller_, source);
+        }
+    }
+    [[nodiscard]] std::optional<std::string_view> baseOf(std::string_view id) const {
+        if (id.starts_with('#')) id.remove_prefix(1);
+        const auto known = bases_.find(id);
+        if (known == bases_.end()) return std::nullopt;
+        return known->second;
+    }
+    [[nodiscard]] std::size_t count() const { return bases_.size(); }
+
+  private:
+    std::string_view controller_;
+    std::map<std::string_view, std::string_view> bases_;
+};
+
 }  // namespace
 
 Result<PlainCollada> plainCollada(ByteSpan bytes) {
-    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const std::string plain =
+        withoutPrefix({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    const std::string_view text = plain;
     PlainCollada out;
+    EffectColours colours;
+    Morphs morphs;
+    ColladaJoints joints;
     TextureSets sets;
-    STX_CHECK(eachTag(text, [&](std::size_t at) -> Result<void> {
+    STX_CHECK(collada::eachTag(text, [&](std::size_t at) -> Result<void> {
         const auto tag = text.substr(at);
         sets.read(text, at);
+        morphs.read(text, at);
+        joints.read(text, at);
         for (const std::string_view name : {"wrap_s", "wrap_t"}) {
-            const auto wrap = trimmed(contentOf(tag, name));
+            const auto wrap = trimmed(collada::contentOf(tag, name));
             const bool known =
                 wrap.empty() || wrap == "WRAP" || wrap == "CLAMP" || wrap == "MIRROR";
             if (out.wrap.empty() && !known) out.wrap = wrap;
@@ -300,6 +368,9 @@ Result<PlainCollada> plainCollada(ByteSpan bytes) {
         return {};
     }));
     sets.resolve();
+    joints.resolve();
+    out.morphs = morphs.count();
+    out.twoSkeletons = joints.twoSkeletons();
     out.boundTwice = sets.boundTwice();
     std::string_view effect;
     // Of an effect's parameters, by sid: along s and t.
@@ -311,23 +382,60 @@ Result<PlainCollada> plainCollada(ByteSpan bytes) {
         out.text += with;
         copied = to;
     };
-    STX_CHECK(eachTag(text, [&](std::size_t at) -> Result<void> {
+    bool inMorph = false, hasHoles = false;
+    // What is an instance, or a skin, of a morph becomes that of its base.
+    const auto replaceMorph = [&](std::size_t at) {
         const auto tag = text.substr(at);
-        if (nameOf(tag) == "effect") {
-            wraps.clear();
-            effect = attributeOf(tag, "id");
+        const auto name = collada::nameOf(tag);
+        if (name == "controller" && morphs.baseOf(collada::attributeOf(tag, "id")))
+            return replace(at, collada::endOfElement(text, at), "");
+        if (name == "/instance_controller" && std::exchange(inMorph, false))
+            return replace(at, at + 1 + name.size(), "</instance_geometry");
+        if (name != "instance_controller" && name != "skin") return;
+        const auto reference = collada::attributeOf(tag, name == "skin" ? "source" : "url");
+        const auto base = morphs.baseOf(reference);
+        if (!base) return;
+        if (name != "skin") {
+            replace(at, at + 1 + name.size(), "<instance_geometry");
+            inMorph = !text.substr(0, collada::endOfTag(text, at)).ends_with("/>");
         }
-        if (tag.starts_with("<newparam")) parameter = attributeOf(tag, "sid");
-        if (auto wrap = mayaWrap(contentOf(tag, "wrap_s"), 'U'); !wrap.empty())
+        const auto from = static_cast<std::size_t>(reference.data() - text.data());
+        replace(from, from + reference.size(), fmt::format("#{}", *base));
+    };
+    STX_CHECK(collada::eachTag(text, [&](std::size_t at) -> Result<void> {
+        if (at < copied) return {};
+        const auto tag = text.substr(at);
+        const auto element = collada::nameOf(tag);
+        std::size_t readTo = at;
+        if (const auto colour = colours.read(text, at, readTo)) replace(at, readTo, *colour);
+        replaceMorph(at);
+        if (const auto joint = joints.replacedAt(text, at))
+            replace(joint->from, joint->to, joint->with);
+        if (element == "ph" || element == "/ph") {
+            hasHoles = element == "ph";
+            replace(at, collada::endOfTag(text, at), "");
+            return {};
+        }
+        if (hasHoles && element == "h") {
+            ++out.holes;
+            replace(at, collada::endOfElement(text, at), "");
+            return {};
+        }
+        if (element == "effect") {
+            wraps.clear();
+            effect = collada::attributeOf(tag, "id");
+        }
+        if (tag.starts_with("<newparam")) parameter = collada::attributeOf(tag, "sid");
+        if (auto wrap = mayaWrap(collada::contentOf(tag, "wrap_s"), 'U'); !wrap.empty())
             wraps[parameter].first = std::move(wrap);
-        if (auto wrap = mayaWrap(contentOf(tag, "wrap_t"), 'V'); !wrap.empty())
+        if (auto wrap = mayaWrap(collada::contentOf(tag, "wrap_t"), 'V'); !wrap.empty())
             wraps[parameter].second = std::move(wrap);
         if (tag.starts_with("<texture")) {
-            if (const auto name = attributeOf(tag, "texcoord"); !name.empty()) {
+            if (const auto name = collada::attributeOf(tag, "texcoord"); !name.empty()) {
                 const auto from = static_cast<std::size_t>(name.data() - text.data());
                 replace(from, from + name.size(), fmt::format("{}", sets.numberOf(effect, name)));
             }
-            const auto wrap = wraps.find(attributeOf(tag, "texture"));
+            const auto wrap = wraps.find(collada::attributeOf(tag, "texture"));
             const auto end = text.find_first_of("<>", at + 1);
             if (wrap == wraps.end() || end == std::string_view::npos || text[end] == '<') return {};
             const bool isEmpty = text[end - 1] == '/';
@@ -339,14 +447,15 @@ Result<PlainCollada> plainCollada(ByteSpan bytes) {
         }
         if (const auto numbers = sets.setsOf(at); !numbers.empty()) {
             // Copies, then the tag itself with its own attributes.
-            const auto source = attributeOf(tag, "source"), offset = attributeOf(tag, "offset");
+            const auto source = collada::attributeOf(tag, "source"),
+                       offset = collada::attributeOf(tag, "offset");
             std::string before;
             for (std::size_t k = 1; k < numbers.size(); ++k)
                 before += fmt::format(
                     "<input semantic=\"TEXCOORD\" source=\"{}\" offset=\"{}\" set=\"{}\"/>", source,
                     offset, numbers[k]);
             replace(at, at, before);
-            if (const auto set = attributeOf(tag, "set"); !set.empty()) {
+            if (const auto set = collada::attributeOf(tag, "set"); !set.empty()) {
                 const auto from = static_cast<std::size_t>(set.data() - text.data());
                 replace(from, from + set.size(), fmt::format("{}", numbers[0]));
             } else {
@@ -355,8 +464,8 @@ Result<PlainCollada> plainCollada(ByteSpan bytes) {
             }
             return {};
         }
-        std::optional<glm::dmat4> parentFromHere = lookat(contentOf(tag, "lookat"));
-        const auto skewed = contentOf(tag, "skew");
+        std::optional<glm::dmat4> parentFromHere = lookat(collada::contentOf(tag, "lookat"));
+        const auto skewed = collada::contentOf(tag, "skew");
         if (!skewed.empty()) STX_SET(parentFromHere, skew(skewed));
         if (!parentFromHere) return {};
         std::string matrix = "<matrix>";

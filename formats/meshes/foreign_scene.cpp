@@ -27,8 +27,12 @@ ForeignScene::Material materialIn(Unpacker& in) {
         if (in.get<std::uint8_t>() == 0) continue;
         auto& to = texture.emplace();
         to.name = in.getText();
+        to.property = in.getText();
         to.wrapU = in.get<std::uint8_t>();
         to.wrapV = in.get<std::uint8_t>();
+        to.uvScale = in.get<glm::vec2>();
+        to.uvOffset = in.get<glm::vec2>();
+        to.uvRotationRad = in.get<float>();
         to.uvSet = in.get<std::uint32_t>();
         to.embedded = in.get<std::int32_t>();
     }
@@ -40,6 +44,7 @@ ForeignScene::Material materialIn(Unpacker& in) {
 ForeignScene::Node nodeIn(Unpacker& in) {
     ForeignScene::Node node;
     node.parent = in.get<std::int32_t>();
+    node.name = in.getText();
     node.parentFromNode = in.get<glm::mat4>();
     const auto meshes = in.getBytes();
     node.meshes.resize(meshes.size() / sizeof(std::uint32_t));
@@ -68,6 +73,8 @@ std::optional<ForeignScene> sceneIn(ByteSpan content, std::uint32_t& meshes) {
     }
     meshes = in.get<std::uint32_t>();
     scene.animations = in.get<std::uint32_t>();
+    scene.cameras = in.get<std::uint32_t>();
+    scene.lights = in.get<std::uint32_t>();
     const auto known = [&](std::uint32_t mesh) { return mesh < meshes; };
     const bool all = std::ranges::all_of(
         scene.nodes, [&](const auto& node) { return std::ranges::all_of(node.meshes, known); });

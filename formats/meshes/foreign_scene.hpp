@@ -15,9 +15,12 @@ namespace stx {
 /// Outside of what it is a part of: clang makes none of a nested class before its outer one ends.
 struct ForeignTexture {
     std::string name;
-    std::uint8_t wrapU = 0, wrapV = 0;  ///< values of MeshTexture::Wrap
-    std::uint32_t uvSet = 0;            ///< number of the texture coordinates that it is drawn with
-    std::int32_t embedded = -1;         ///< its number among ForeignScene::embedded, when inside
+    std::string property;                     ///< of FBX, that it is connected to; empty: of no one
+    std::uint8_t wrapU = 0, wrapV = 0;        ///< values of MeshTexture::Wrap
+    glm::vec2 uvScale{1.0f}, uvOffset{0.0f};  ///< first scaled, then moved; v runs up
+    float uvRotationRad = 0;
+    std::uint32_t uvSet = 0;     ///< number of the texture coordinates that it is drawn with
+    std::int32_t embedded = -1;  ///< its number among ForeignScene::embedded, when inside
 };
 
 /// A model as the library that reads it has it, before it is a Mesh: what its process tells
@@ -39,6 +42,7 @@ struct ForeignScene {
     };
     struct Node {
         std::int32_t parent = -1;  ///< comes before it; -1: the root
+        std::string name;
         glm::mat4 parentFromNode{1.0f};
         std::vector<std::uint32_t> meshes;
     };
@@ -59,7 +63,7 @@ struct ForeignScene {
     std::vector<Embedded> embedded;
     std::vector<Node> nodes;
     std::vector<Mesh> meshes;
-    std::uint32_t animations = 0;
+    std::uint32_t animations = 0, cameras = 0, lights = 0;
 };
 
 /// What a process tells of a model, after Tag::scene with these bytes. Errors (invalidInput): it

@@ -298,6 +298,15 @@ void MeshBuilder::fillNormals() {
         });
 }
 
+/// Between a float of the size of the largest coordinate and the next.
+double MeshBuilder::largestStep() const {
+    double largest = 0;
+    for (const auto& p : positions_)
+        for (int k = 0; k < 3; ++k) largest = std::max(largest, std::abs(p[k]));
+    const auto value = static_cast<float>(largest);
+    return std::nextafter(value, std::numeric_limits<float>::infinity()) - value;
+}
+
 /// Doubles become floats, from an origin where floats would lose too much.
 void MeshBuilder::roundPositions() {
     const auto triangles = mesh_.triangles.size(), count = triangles + mesh_.points.size();
@@ -317,7 +326,13 @@ void MeshBuilder::roundPositions() {
                mesh_.origin, job_);
     const auto origin = originFor(strays.bounds);
     mesh_.origin += origin;
-    if (mesh_.origin != glm::dvec3(0.0))
+    if (rounded_ && origin != glm::dvec3(0.0))
+        job_.note(fmt::format(
+            "the coordinates are too large for 32-bit floats, to which the reader of this format "
+            "rounds them, in steps of up to {:.2g}: where that shows, move the model to the origin "
+            "or save it as OBJ; the origin {} {} {} is kept beside them",
+            largestStep(), mesh_.origin.x, mesh_.origin.y, mesh_.origin.z));
+    else if (mesh_.origin != glm::dvec3(0.0))
         job_.note(fmt::format(
             "the coordinates are too large for 32-bit floats: the origin {} {} {} is subtracted "
             "before they are rounded, and kept beside them",
@@ -373,6 +388,14 @@ Result<Mesh> MeshBuilder::finish() {
                         "none of the model's {} points is at a finite place; positions must be "
                         "finite numbers",
                         points_);
+        // Where coordinates are rounded by more than centimetres, that may have taken the areas.
+        constexpr double kCoarseStep = 1.0 / 128;
+        if (flatTriangles_ > 0 && rounded_ && largestStep() > kCoarseStep)
+            return fail(ErrorCode::invalidInput,
+                        "the model has {} triangles, but none with an area, and no points; the "
+                        "reader of this format rounds coordinates to 32-bit floats, here in steps "
+                        "of up to {:.2g}: move the model to the origin or save it as OBJ",
+                        flatTriangles_, largestStep());
         if (flatTriangles_ > 0)
             return fail(ErrorCode::invalidInput,
                         "the model has {} triangles, but none with an area, and no points",

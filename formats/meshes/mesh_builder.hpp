@@ -52,6 +52,10 @@ class MeshBuilder {
     /// The positions of all parts count from here in the world: a reader took it away already.
     void setOrigin(glm::dvec3 origin) { mesh_.origin = origin; }
 
+    /// The positions of parts were floats before, whatever the file has: that is said of large
+    /// ones.
+    void setRounded() { rounded_ = true; }
+
     /// The mesh, checked. Attributes that only some parts have are filled in for the others. Large
     /// coordinates count from an origin then (originFor()), and what lies far off is said.
     [[nodiscard]] Result<Mesh> finish();
@@ -63,12 +67,14 @@ class MeshBuilder {
     void fillNormals();
     void roundPositions();
     void dropUnusedTextures();
+    [[nodiscard]] double largestStep() const;
 
     Job& job_;
     Mesh mesh_;                          ///< its positions come at the end
     std::vector<glm::dvec3> positions_;  ///< of all parts
     std::uint64_t charged_ = 0;
     int parts_ = 0;
+    bool rounded_ = false;
     std::uint64_t flatTriangles_ = 0;
     std::uint64_t points_ = 0, brokenPoints_ = 0;
 };

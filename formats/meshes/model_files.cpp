@@ -44,6 +44,7 @@ Result<std::filesystem::path> ModelFiles::find(std::string_view name,
 }
 
 std::string_view ModelFiles::whyNotThere(std::string_view name, const Error& error) const {
+    if (name.empty()) return "has no name";
     std::error_code ec;
     const auto status = std::filesystem::status(folder_ / name, ec);
     if (std::filesystem::is_directory(status)) return "is a folder, not a file";

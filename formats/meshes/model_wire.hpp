@@ -12,6 +12,9 @@ namespace stx::models {
 /// A name that does not exist on any disk, so that all that is opened is asked for.
 inline constexpr const char* kModelFolder = "stx-model/";
 
+/// Assimp's name of the material of what has none.
+inline constexpr const char* kUnnamedMaterial = "DefaultMaterial";
+
 /// What textures are for, in the order in which they are sent.
 enum class TextureUse : std::uint8_t { diffuse, opacity, emissive, normals };
 inline constexpr std::size_t kTextureUses = 4;

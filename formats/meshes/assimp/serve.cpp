@@ -10,7 +10,10 @@
 #include <assimp/Importer.hpp>
 
 #include <algorithm>
+#include <array>
+#include <initializer_list>
 #include <map>
+#include <optional>
 
 #include "formats/decoders/decoder_module.hpp"
 #include "formats/decoders/given_file.hpp"
@@ -108,6 +111,20 @@ constexpr aiTextureType kTypes[] = {aiTextureType_DIFFUSE, aiTextureType_OPACITY
                                     aiTextureType_EMISSIVE, aiTextureType_NORMALS};
 static_assert(std::size(kTypes) == kTextureUses);
 
+/// The properties of FBX's materials that have a map for each of these uses, those of physical
+/// materials last. Assimp gives types to a few of them alone.
+constexpr std::array<std::initializer_list<const char*>, kTextureUses> kProperties = {{
+    {"DiffuseColor", "Maya|DiffuseTexture|file", "Maya|baseColor", "Maya|baseColor|file",
+     "Maya|TEX_color_map", "Maya|TEX_color_map|file", "3dsMax|Parameters|base_color_map",
+     "3dsMax|main|base_color_map"},
+    {"TransparentColor", "TransparencyFactor"},
+    {"EmissiveColor", "EmissiveFactor", "Maya|emissionColor", "Maya|emissionColor|file",
+     "Maya|TEX_emissive_map", "Maya|TEX_emissive_map|file", "3dsMax|Parameters|emission_map",
+     "3dsMax|Parameters|emit_color_map", "3dsMax|main|emit_color_map"},
+    {"NormalMap", "Maya|NormalTexture|file", "Maya|normalCamera", "Maya|normalCamera|file",
+     "Maya|TEX_normal_map", "Maya|TEX_normal_map|file", "3dsMax|main|norm_map"},
+}};
+
 class SceneTeller {
   public:
     explicit SceneTeller(const aiScene& scene) : scene_(scene) {}
@@ -128,6 +145,8 @@ class SceneTeller {
         out_.add(nodes.bytes.data(), nodes.bytes.size());
         out_.put(scene_.mNumMeshes);
         out_.put(scene_.mNumAnimations);
+        out_.put(scene_.mNumCameras);
+        out_.put(scene_.mNumLights);
         if (!decoders::sendMessage(answers, Tag::scene, out_.bytes)) return false;
         for (unsigned i = 0; i < scene_.mNumMeshes; ++i)
             if (!sendMesh(*scene_.mMeshes[i])) return false;
@@ -150,32 +169,73 @@ class SceneTeller {
         putOptional(from.Get(AI_MATKEY_COLOR_EMISSIVE, colour) == aiReturn_SUCCESS, colour);
         float opacity = 1.0f;
         putOptional(from.Get(AI_MATKEY_OPACITY, opacity) == aiReturn_SUCCESS, opacity);
-        for (const aiTextureType type : kTypes) putTexture(from, type);
+        for (std::size_t use = 0; use < kTextureUses; ++use) putTexture(from, use);
         out_.put(static_cast<std::uint8_t>(from.GetTextureCount(aiTextureType_HEIGHT) > 0));
         out_.put(static_cast<std::uint8_t>(from.GetTextureCount(aiTextureType_DISPLACEMENT) > 0));
     }
 
-    void putTexture(const aiMaterial& from, aiTextureType type) {
+    /// Where a material has what it says of a texture: under a property of FBX, which alone says
+    /// which of the pictures inside the file is meant, or under a type.
+    struct TextureKeys {
+        std::string property, file, uvTransform, uvSet;
+        unsigned type = 0;
+    };
+
+    static std::optional<TextureKeys> keysOf(const aiMaterial& from, std::size_t use) {
         aiString name;
-        const bool there = from.GetTexture(type, 0, &name) == aiReturn_SUCCESS;
-        out_.put(static_cast<std::uint8_t>(there));
-        if (!there) return;
-        out_.putText(name.C_Str());
+        for (const char* property : kProperties[use]) {
+            const auto key = [&](const char* what) {
+                return fmt::format("$raw.{}|{}", property, what);
+            };
+            if (from.Get(key("file").c_str(), aiTextureType_UNKNOWN, 0, name) == aiReturn_SUCCESS)
+                return TextureKeys{property, key("file"), key("uvtrafo"), key("uvwsrc"),
+                                   aiTextureType_UNKNOWN};
+        }
+        if (from.GetTexture(kTypes[use], 0, &name) != aiReturn_SUCCESS) return std::nullopt;
+        return TextureKeys{"", _AI_MATKEY_TEXTURE_BASE, _AI_MATKEY_UVTRANSFORM_BASE,
+                           _AI_MATKEY_UVWSRC_BASE, static_cast<unsigned>(kTypes[use])};
+    }
+
+    /// Of a picture inside the file: its own name where no other one has it, else its number.
+    [[nodiscard]] const char* nameOf(const aiTexture& inside, const aiString& number) const {
+        const std::span all(scene_.mTextures, scene_.mNumTextures);
+        const auto same = std::ranges::count_if(
+            all, [&](const aiTexture* each) { return each->mFilename == inside.mFilename; });
+        return same == 1 && inside.mFilename.length > 0 ? inside.mFilename.C_Str() : number.C_Str();
+    }
+
+    void putTexture(const aiMaterial& from, std::size_t use) {
+        const auto keys = keysOf(from, use);
+        out_.put(static_cast<std::uint8_t>(keys.has_value()));
+        if (!keys) return;
+        aiString name;
+        from.Get(keys->file.c_str(), keys->type, 0, name);
+        const aiTexture* inside = nullptr;
+        if (keys->property.empty() || name.C_Str()[0] == '*')
+            inside = scene_.GetEmbeddedTexture(name.C_Str());
+        out_.putText(inside ? nameOf(*inside, name) : name.C_Str());
+        out_.putText(keys->property);
         const auto wrap = [](int mode) {
             const auto kind = mode == aiTextureMapMode_Mirror  ? MeshTexture::Wrap::mirror
                               : mode == aiTextureMapMode_Clamp ? MeshTexture::Wrap::clamp
                                                                : MeshTexture::Wrap::repeat;
             return static_cast<std::uint8_t>(kind);
         };
+        const aiTextureType type = kTypes[use];
         int mode = aiTextureMapMode_Wrap;
         from.Get(AI_MATKEY_MAPPINGMODE_U(type, 0), mode);
         out_.put(wrap(mode));
         mode = aiTextureMapMode_Wrap;
         from.Get(AI_MATKEY_MAPPINGMODE_V(type, 0), mode);
         out_.put(wrap(mode));
-        out_.put(static_cast<std::uint32_t>(uvSetOf(from, type)));
+        aiUVTransform uv;
+        from.Get(keys->uvTransform.c_str(), keys->type, 0, uv);
+        out_.put(uv.mScaling);
+        out_.put(uv.mTranslation);
+        out_.put(uv.mRotation);
+        out_.put(static_cast<std::uint32_t>(uvSetOf(from, *keys)));
         std::int32_t number = -1;
-        if (const aiTexture* inside = scene_.GetEmbeddedTexture(name.C_Str())) {
+        if (inside) {
             const auto [at, added] =
                 numbers_.emplace(inside, static_cast<std::int32_t>(embedded_.size()));
             if (added) embedded_.push_back(inside);
@@ -223,9 +283,9 @@ class SceneTeller {
         return glm::mat4(glm::mat3(metres)) * (done ? given : worldFromFile());
     }
 
-    static int uvSetOf(const aiMaterial& material, aiTextureType type) {
+    static int uvSetOf(const aiMaterial& material, const TextureKeys& keys) {
         int set = 0;
-        material.Get(AI_MATKEY_UVWSRC(type, 0), set);
+        material.Get(keys.uvSet.c_str(), keys.type, 0, set);
         return set;
     }
 
@@ -236,9 +296,10 @@ class SceneTeller {
         if (arrays == 0 || mesh.mMaterialIndex >= scene_.mNumMaterials)
             return mesh.mTextureCoords[0];
         const aiMaterial& material = *scene_.mMaterials[mesh.mMaterialIndex];
-        const auto* type = std::ranges::find_if(
-            kTypes, [&](aiTextureType each) { return material.GetTextureCount(each) > 0; });
-        const int set = type == std::end(kTypes) ? 0 : uvSetOf(material, *type);
+        std::optional<TextureKeys> first;
+        for (std::size_t use = 0; use < kTextureUses && !first; ++use)
+            first = keysOf(material, use);
+        const int set = first ? uvSetOf(material, *first) : 0;
         return mesh.mTextureCoords[std::clamp(set, 0, arrays - 1)];
     }
 
@@ -246,6 +307,7 @@ class SceneTeller {
         const std::int32_t self = nodes_++;
         nodeOf_.emplace(node.mName.C_Str(), self);
         to.put(parent);
+        to.putText(node.mName.C_Str());
         const glm::mat4 parentFromNode = toMatrix(node.mTransformation);
         to.put(parent < 0 ? worldFromRoot(parentFromNode) : parentFromNode);
         to.putBytes(std::as_bytes(std::span(node.mMeshes, node.mNumMeshes)));
@@ -337,6 +399,8 @@ void serve(int socket, int file) {
     try {
         const std::string name = kModelFolder + decoders::Unpacker(request).getText();
         Assimp::Importer importer;
+        // Else files without meshes get those of bones that nobody made.
+        importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
         importer.SetIOHandler(new Files(given.bytes(), name));
         const aiScene* scene = importer.ReadFile(name, 0);
         if (!scene)

@@ -250,5 +250,190 @@ stride="16"><param name="TRANSFORM" type="float4x4"/></accessor></technique_comm
     EXPECT_GT(facing(read(bones("<scale>-1 1 1</scale>", ""))), 0) << "mirrored";
 }
 
+/// The triangle with a material whose effect has this in its profile.
+std::string colladaWithEffect(const std::string& profile) {
+    auto text = colladaOf("<node>%</node>");
+    const auto replace = [&](const std::string& what, const std::string& with) {
+        text.replace(text.find(what), what.size(), with);
+    };
+    replace("<library_geometries>",
+            R"(<library_effects><effect id="e"><profile_COMMON>)" + profile +
+                R"(</profile_COMMON></effect></library_effects><library_materials>
+<material id="m" name="m"><instance_effect url="#e"/></material></library_materials>
+<library_geometries>)");
+    replace("<triangles", R"(<triangles material="mm")");
+    replace(R"(<instance_geometry url="#g"/>)", R"(<instance_geometry url="#g"><bind_material>
+<technique_common><instance_material symbol="mm" target="#m"/></technique_common></bind_material>
+</instance_geometry>)");
+    return text;
+}
+
+Material materialOfEffect(const std::string& shader, const std::string& parameters = "") {
+    const auto model = readGoodText(
+        colladaWithEffect(parameters + "<technique sid=\"c\">" + shader + "</technique>"), "a.dae");
+    if (model.mesh.materials.size() != 1) {
+        ADD_FAILURE() << model.mesh.materials.size() << " materials";
+        return {};
+    }
+    return model.mesh.materials[0];
+}
+
+TEST(Collada, ColoursAreThoseOfTheFile) {
+    const glm::vec4 red(1, 0, 0, 1), black(0, 0, 0, 1);
+    EXPECT_EQ(
+        materialOfEffect("<phong><diffuse><color>1 0 0 1</color></diffuse></phong>").baseColour,
+        red);
+    // Parameters are values elsewhere.
+    for (const char* value : {"<float4>1 0 0 1</float4>", "<float3>1 0 0</float3>"})
+        EXPECT_EQ(materialOfEffect(R"(<lambert><diffuse><param ref="c"/></diffuse></lambert>)",
+                                   fmt::format(R"(<newparam sid="c">{}</newparam>)", value))
+                      .baseColour,
+                  red)
+            << value;
+    // Without a colour there is none; constant shading is what it emits.
+    for (const char* shader :
+         {"<lambert></lambert>", "<lambert/>", "<constant></constant>",
+          R"(<blinn><diffuse><param ref="nowhere"></param></diffuse></blinn>)"})
+        EXPECT_FALSE(materialOfEffect(shader).hasColour) << shader;
+    const auto constant =
+        materialOfEffect("<constant><emission><color>0 1 0 1</color></emission></constant>");
+    EXPECT_EQ(constant.baseColour, black);
+    EXPECT_EQ(constant.emissive, glm::vec3(0, 1, 0));
+}
+
+TEST(Collada, NamesMayHaveAPrefix) {
+    std::string text = colladaOf("<node><translate>0 0 2</translate>%</node>");
+    for (auto at = text.find('<'); at != std::string::npos; at = text.find('<', at + 1))
+        if (text[at + 1] != '?') text.insert(at + (text[at + 1] == '/' ? 2 : 1), "c:");
+    text.replace(text.find("xmlns"), 5, "xmlns:c");
+    EXPECT_EQ(readGoodText(text, "a.dae").mesh.positions.at(1), glm::vec3(1, 0, 2));
+}
+
+TEST(Collada, MorphsHaveTheirBaseShape) {
+    std::string text = colladaOf("<node>%</node>");
+    const auto replace = [&](const std::string& what, const std::string& with) {
+        text.replace(text.find(what), what.size(), with);
+    };
+    replace("<library_visual_scenes>", R"(<library_controllers><controller id="k">
+<morph source="#g" method="NORMALIZED"><source id="kt"><IDREF_array id="kta" count="1">g</IDREF_array>
+<technique_common><accessor source="#kta" count="1" stride="1"><param name="IDREF" type="IDREF"/>
+</accessor></technique_common></source><source id="kw"><float_array id="kwa" count="1">1</float_array>
+<technique_common><accessor source="#kwa" count="1" stride="1"><param name="MORPH_WEIGHT"
+type="float"/></accessor></technique_common></source><targets><input semantic="MORPH_TARGET"
+source="#kt"/><input semantic="MORPH_WEIGHT" source="#kw"/></targets></morph></controller>
+</library_controllers><library_visual_scenes>)");
+    for (const char* instance : {R"(<instance_controller url="#k"/>)",
+                                 R"(<instance_controller url="#k"></instance_controller>)"}) {
+        const auto before = text;
+        replace(R"(<instance_geometry url="#g"/>)", instance);
+        const auto model = readGoodText(text, "a.dae");
+        EXPECT_EQ(model.mesh.triangles.size(), 1u) << instance;
+        EXPECT_TRUE(model.hasNote("dropped: morphs (1); what they morph has its base shape"));
+        text = before;
+    }
+}
+
+TEST(Collada, HolesOfPolygonsAreFilled) {
+    std::string text = colladaOf("<node>%</node>");
+    const auto replace = [&](const std::string& what, const std::string& with) {
+        text.replace(text.find(what), what.size(), with);
+    };
+    replace("<triangles", "<polygons");
+    replace("</triangles", "</polygons");
+    replace("<p>0 1 2</p>", "<ph><p>0 1 2</p><h>0 1 2</h><h>2 1 0</h></ph>");
+    const auto model = readGoodText(text, "a.dae");
+    EXPECT_EQ(model.mesh.triangles.size(), 1u);
+    EXPECT_TRUE(model.hasNote("holes of polygons are not read: 2 are filled"));
+}
+
+TEST(Collada, TexturesAreMovedAsMayaSays) {
+    auto text = colladaWithSets(0, 1, "");
+    const std::string end = R"(UVMap"/>)";
+    text.replace(text.find(end), end.size(), R"(UVMap"><extra><technique profile="MAYA">
+<repeatU>2</repeatU><repeatV>1</repeatV><offsetU>0.125</offsetU><offsetV>0.25</offsetV></technique>
+</extra></texture>)");
+    const auto model = readGoodText(text, "a.dae");
+    ASSERT_FALSE(model.mesh.uvs.empty());
+    expectNear(model.mesh.uvs[0], glm::vec2(0.625f, 0.25f));
+}
+
+/// A skin of the triangle `g`, all of whose vertices follow the joint 'b'.
+std::string skinOfOneJoint(const std::string& id) {
+    const auto source = [&](const std::string& name, const std::string& array,
+                            const std::string& accessor) {
+        return fmt::format(
+            R"(<source id="{0}{1}">{2}<technique_common><accessor source="#{0}{1}a" {3}</accessor>
+</technique_common></source>)",
+            id, name, array, accessor);
+    };
+    return fmt::format(R"(<controller id="{}"><skin source="#g">)", id) +
+           source("j", fmt::format(R"(<Name_array id="{}ja" count="1">b</Name_array>)", id),
+                  R"(count="1" stride="1"><param name="JOINT" type="name"/>)") +
+           source("b",
+                  fmt::format(R"(<float_array id="{}ba" count="16">1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1
+</float_array>)",
+                              id),
+                  R"(count="1" stride="16"><param name="TRANSFORM" type="float4x4"/>)") +
+           source("w", fmt::format(R"(<float_array id="{}wa" count="1">1</float_array>)", id),
+                  R"(count="1" stride="1"><param name="WEIGHT" type="float"/>)") +
+           fmt::format(R"(<joints><input semantic="JOINT" source="#{0}j"/>
+<input semantic="INV_BIND_MATRIX" source="#{0}b"/></joints><vertex_weights count="3">
+<input semantic="JOINT" source="#{0}j" offset="0"/><input semantic="WEIGHT" source="#{0}w" offset="1"/>
+<vcount>1 1 1</vcount><v>0 0 0 0 0 0</v></vertex_weights></skin></controller>)",
+                       id);
+}
+
+TEST(Collada, JointsAreThoseOfTheSkinsSkeleton) {
+    const auto read = [](const std::string& instances) {
+        std::string nodes;
+        for (int i = 1; i <= 2; ++i)
+            nodes += fmt::format(R"(<node id="root{0}" type="JOINT"><node id="b{0}" sid="b"
+type="JOINT"><translate>{1} 0 0</translate></node></node>)",
+                                 i, 10 * i);
+        auto text = colladaOf(nodes + "<node>%</node>");
+        const std::string instance = R"(<instance_geometry url="#g"/>)";
+        text.replace(text.find(instance), instance.size(), instances);
+        const std::string scenes = "<library_visual_scenes>";
+        text.replace(text.find(scenes), 0,
+                     "<library_controllers>" + skinOfOneJoint("k1") + skinOfOneJoint("k2") +
+                         "</library_controllers>");
+        return readGoodText(text, "a.dae");
+    };
+    const auto instance = [](int skin, int skeleton) {
+        return fmt::format(R"(<instance_controller url="#k{}"><skeleton>#root{}</skeleton>
+</instance_controller>)",
+                           skin, skeleton);
+    };
+    const auto model = read(instance(1, 2) + instance(2, 1));
+    ASSERT_EQ(model.mesh.positions.size(), 6u);
+    EXPECT_EQ(model.mesh.positions[0].x, 20.0f);
+    EXPECT_EQ(model.mesh.positions[3].x, 10.0f);
+    EXPECT_TRUE(read(instance(1, 2) + instance(1, 1))
+                    .hasNote("skin 'k1' is shown with several skeletons; all have the pose of the "
+                             "first"));
+}
+
+TEST(Collada, BonesAloneAreNoModel) {
+    std::string text = colladaOf("<node id=\"a\" type=\"JOINT\"/>%");
+    text.replace(text.find(R"(<instance_geometry url="#g"/>)"), 29, "");
+    EXPECT_EQ(readBadText(text, "a.dae").text(),
+              "'a.dae': the model has neither triangles nor points; export its faces or its "
+              "vertices with it");
+}
+
+TEST(Collada, CoordinatesAreRoundedWhereTheyAreLarge) {
+    EXPECT_TRUE(
+        readGoodText(colladaOf("<node><translate>10000000 0 0</translate>%</node>"), "a.dae")
+            .hasNote("to which the reader of this format rounds them, in steps of up to 1: "
+                     "where that shows, move the model to the origin or save it as OBJ; "
+                     "the origin 1000000"));
+    std::string text = colladaOf("<node>%</node>");
+    text.replace(text.find("0 0 0 1 0 0 0 1 0"), 17, "44000000 0 0 44000001 0 0 44000000 1 0");
+    EXPECT_EQ(readBadText(text, "a.dae").text(),
+              "'a.dae': the model has 1 triangles, but none with an area, and no points; the "
+              "reader of this format rounds coordinates to 32-bit floats, here in steps of up to "
+              "4: move the model to the origin or save it as OBJ");
+}
+
 }  // namespace
 }  // namespace stx
