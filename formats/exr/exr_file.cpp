@@ -19,7 +19,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cstring>
 #include <limits>
@@ -232,51 +231,27 @@ bool ExrReader::Impl::readZippedChunk(int index, std::size_t chunk, Rows at,
         !exr::unzipChunk({packed.get(), static_cast<std::size_t>(stored)},
                          {reinterpret_cast<std::uint8_t*>(raw.get()), rawBytes}))
         return false;
-    // Where the values of a channel begin in a row, 16-bit words; none where it is not there.
-    struct Place {
-        std::size_t before = 0;
-        bool half = false;
-    };
-    const auto placeOf = [&](const ExrPixels& p) -> std::optional<Place> {
-        Place place;
+    for (const auto& p : pixels) {
+        std::size_t before = 0;  // 16-bit words of a row
+        const ExrChannel* channel = nullptr;
         for (const auto& c : part.channels) {
-            place.half = c.type == ExrChannel::Type::half;
-            if (c.name == p.channel) return place;
-            place.before += width * (place.half ? 1 : 2);
+            if (c.name == p.channel) {
+                channel = &c;
+                break;
+            }
+            before += width * (c.type == ExrChannel::Type::half ? 1 : 2);
         }
-        return std::nullopt;
-    };
-    for (std::size_t k = 0; k < pixels.size(); ++k) {
-        const auto place = placeOf(pixels[k]);
-        if (!place) continue;
-        const auto row = [&](const Place& of, int y) {
-            return raw.get() + static_cast<std::size_t>(y) * rowBytes / 2 + of.before;
-        };
-        const auto to = [&](int y) {
-            return pixels[k].values +
-                   static_cast<std::size_t>(top - at.y + y) * width * pixels[k].stride;
-        };
-        // Four channels of the same pixels are written together.
-        std::array<Place, 4> four;
-        bool together = k + 4 <= pixels.size();
-        for (std::size_t i = 0; together && i < 4; ++i) {
-            const ExrPixels& p = pixels[k + i];
-            const auto found = placeOf(p);
-            together = found && found->half && p.stride == 4 && p.values == pixels[k].values + i;
-            if (together) four[i] = *found;
-        }
+        if (!channel) continue;
         for (int y = 0; y < rows; ++y) {
-            const std::uint16_t* from = row(*place, y);
-            if (together)
-                exr::floatsFrom({from, row(four[1], y), row(four[2], y), row(four[3], y)}, width,
-                                to(y));
-            else if (place->half)
-                exr::floatsFrom({from, width}, to(y), pixels[k].stride);
+            const std::uint16_t* from =
+                raw.get() + static_cast<std::size_t>(y) * rowBytes / 2 + before;
+            float* to = p.values + static_cast<std::size_t>(top - at.y + y) * width * p.stride;
+            if (channel->type == ExrChannel::Type::half)
+                exr::floatsFrom({from, width}, to, p.stride);
             else
                 for (std::size_t x = 0; x < width; ++x)
-                    std::memcpy(to(y) + x * pixels[k].stride, from + 2 * x, sizeof(float));
+                    std::memcpy(to + x * p.stride, from + 2 * x, sizeof(float));
         }
-        if (together) k += 3;
     }
     return true;
 }

@@ -75,19 +75,6 @@ void floatsFrom(std::span<const std::uint16_t> halves, float* to, std::size_t st
     }
 }
 
-void floatsFrom(std::array<const std::uint16_t*, 4> halves, std::size_t count, float* to) {
-    constexpr std::size_t kPiece = 64;
-    float pieces[4][kPiece];
-    for (std::size_t begin = 0; begin < count; begin += kPiece) {
-        const std::size_t some = std::min(kPiece, count - begin);
-        for (std::size_t k = 0; k < 4; ++k)
-            for (std::size_t i = 0; i < some; ++i) pieces[k][i] = floatOf(halves[k][begin + i]);
-        float* at = to + 4 * begin;
-        for (std::size_t i = 0; i < some; ++i)
-            for (std::size_t k = 0; k < 4; ++k) at[4 * i + k] = pieces[k][i];
-    }
-}
-
 bool unzipChunk(ByteSpan stored, std::span<std::uint8_t> raw) {
     if (stored.size() == raw.size()) {
         std::memcpy(raw.data(), stored.data(), raw.size());

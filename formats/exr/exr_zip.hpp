@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -23,8 +22,6 @@ void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> 
 
 /// The inverse of halvesFrom(), exact: writes every `stride`-th of `to`.
 void floatsFrom(std::span<const std::uint16_t> halves, float* to, std::size_t stride);
-/// The same of four channels, one value of each after the other.
-void floatsFrom(std::array<const std::uint16_t*, 4> halves, std::size_t count, float* to);
 
 /// The inverse of splitAndSubtract() and zipChunk(): fills `raw`. False, and anything in `raw`,
 /// when the bytes are damaged or hold another number of bytes. Throws std::bad_alloc.
