@@ -172,9 +172,9 @@ def collada(scene, folder):
 
 
 def fbx(scene, folder):
-    if any(m.get("clamps") for m in scene.materials):
-        return None
     objects, connections = [], []
+    # Coordinates of each texture, moved by the file or in it.
+    shifts = [scene.dice.choice([(0, 0), (0.25, -0.5)]) for _ in scene.materials]
 
     def block(head, *lines):
         return head + " {\n" + "".join(f"\t{line}\n" for text in lines for line in text.split("\n")) + "}"
@@ -211,7 +211,7 @@ def fbx(scene, folder):
         objects.append(block(
             f'Geometry: {200 + i}, "Geometry::part", "Mesh"', array("Vertices", [c for p in mesh for c in p.corners]),
             array("PolygonVertexIndex", corners), "GeometryVersion: 124",
-            layer("UV", 0, "ByPolygonVertex", array("UV", [float(v) for p in mesh for uv in p.uvs for v in uv])),
+            layer("UV", 0, "ByPolygonVertex", array("UV", [float(v - s) for p in mesh for uv in p.uvs for v, s in zip(uv, shifts[p.material])])),
             layer("Material", 0, "ByPolygon", array("Materials", [used.index(p.material) for p in mesh])),
             block("Layer: 0", "Version: 100", *(block("LayerElement: ", f'Type: "LayerElement{kind}"', "TypedIndex: 0")
                                                 for kind in ("Material", "UV")))))
@@ -220,7 +220,10 @@ def fbx(scene, folder):
             "Properties70: ", 'P: "DiffuseColor", "Color", "", "A",' + ",".join(map(str, m["colour"])))))
         if m["texture"] >= 0:
             file = f"texture{m['texture']}.png"
-            objects.append(block(f'Texture: {400 + k}, "Texture::t{k}", ""', 'Type: "TextureVideoClip"', "Version: 202",
+            (x, y), clamps = shifts[k], int(m["clamps"])
+            objects.append(block(f'Texture: {400 + k}, "Texture::t{k}", ""', 'Type: "TextureVideoClip"', "Version: 202", block(
+                "Properties70: ", f'P: "Translation", "Vector", "", "A",{x},{y},0', f'P: "WrapModeU", "enum", "", "",{clamps}',
+                f'P: "WrapModeV", "enum", "", "",{clamps}'),
                                  f'FileName: "{file}"', f'RelativeFilename: "{file}"'))
             connections.append((400 + k, 300 + k, "DiffuseColor"))
     axes = {"Y": (1, 1, 2, 1, 0, 1), "Z": (2, 1, 1, -1, 0, 1)}[up]
