@@ -46,6 +46,13 @@ void forgetTarget(const fs::path& temporary) {
     const std::lock_guard lock(targets().mutex);
     targets().of.erase(temporary);
 }
+bool isInTemporaryFolder(const fs::path& file) {
+    const std::lock_guard lock(targets().mutex);
+    for (fs::path folder = folderOf(file); folder.has_relative_path();
+         folder = folder.parent_path())
+        if (targets().of.contains(folder)) return true;
+    return false;
+}
 
 tl::unexpected<Error> failIo(std::string_view doing, const fs::path& path, int error) {
     return fail(ErrorCode::io, "cannot {} '{}': {}", doing, shownName(path).string(),
@@ -274,8 +281,10 @@ Result<void> OutputFile::commit() {
         if (const int error = f.fd.close()) return failIo("write", f.target, error);
         return {};
     }
-    // A full disk may only show here, not by write().
-    if (::fsync(f.fd.get()) != 0 && errno != EINVAL && errno != ENOTSUP)
+    // A full disk may only show here, not by write(). A folder that appears as a whole has its
+    // files flushed then.
+    if (!isInTemporaryFolder(f.real) && ::fsync(f.fd.get()) != 0 && errno != EINVAL &&
+        errno != ENOTSUP)
         return failIo("write", f.target, errno);
     if (f.options.noClobber) {
         if (const int error = renameNoReplace(f.temporary, f.real)) {

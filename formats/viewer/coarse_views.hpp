@@ -6,7 +6,7 @@
 
 namespace stx {
 
-/// Whether takeCoarseAway() may change views of one moment. Told without pixels.
+/// Whether takeCoarseAway() may change views of one moment. Needs no pixels.
 [[nodiscard]] bool mayHaveCoarse(std::span<const ReferenceView> views);
 
 /// Takes away the points that other views show at least twice as finely, and views that have no
