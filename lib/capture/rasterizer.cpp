@@ -12,8 +12,8 @@
 #include "lib/capture/layers.hpp"
 #include "lib/capture/material_sampler.hpp"
 #include "lib/capture/tile_kernels.hpp"
+#include "lib/capture/triangles.hpp"
 #include "lib/geometry/depth_code.hpp"
-#include "lib/splats/draw.hpp"
 
 namespace stx {
 namespace {
@@ -22,8 +22,6 @@ namespace {
 constexpr int kTile = 32;
 /// Less than this of a surface is not there: half a step of 8 bits.
 constexpr float kLeastAlpha = 0.5f / 255.0f;
-/// Samples of a line that are too few to be worth more than a plain loop.
-constexpr int kFew = 4;
 /// A triangle at most this many samples wide is asked for at all samples around it.
 constexpr int kNarrow = 16;
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -68,6 +66,8 @@ class Rasterizer {
           pixelSamples_(settings.supersampling) {}
 
     Result<RasterImage> run(const RasterSettings& settings, Job& job);
+    /// shownTriangles().
+    Result<std::vector<std::uint8_t>> shown(int samples, Job& job);
 
   private:
     /// Where the vertices are in the picture: pixels_.
@@ -85,8 +85,9 @@ class Rasterizer {
         std::vector<std::uint32_t> ids;  ///< its slot, or kNone; as many
         Layers layers;                   ///< translucent surfaces in front of it
     };
-    /// Shrinks [from, to] to the samples of a line that are inside; false when none is.
-    static bool clipSpan(const SetUp& s, double y, double step, double origin, int& from, int& to);
+    /// draw(x, y, tile) for each tile that may show something, from several threads.
+    template <class Draw>
+    Result<void> forEachTile(int samples, Job& job, const Draw& draw);
     void drawSpan(std::uint32_t slot, double y, int from, int to, double step, double origin,
                   std::size_t line, Tile& tile) const;
     void drawLayerSpan(std::uint32_t slot, double y, int from, int to, double step, double origin,
@@ -184,60 +185,16 @@ bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out) const {
     return true;
 }
 
-bool Rasterizer::clipSpan(const SetUp& s, double y, double step, double origin, int& from,
-                          int& to) {
-    // A few samples are asked one by one.
-    if (to - from < kFew) {
-        const auto &p = s.edge[0], &q = s.edge[1], &r = s.edge[2];
-        const double atP = p.b * y + p.c, atQ = q.b * y + q.c, atR = r.b * y + r.c;
-        const auto inside = [&](int i) {
-            const double x = origin + i * step;
-            return p.a * x + atP >= 0 && q.a * x + atQ >= 0 && r.a * x + atR >= 0;
-        };
-        while (from <= to && !inside(from)) ++from;
-        while (from <= to && !inside(to)) --to;
-        return from <= to;
-    }
-    // Shrink [from, to] by each edge; the exact predicate decides at the ends, and being monotone
-    // in x it holds in between.
-    const double perStep = 1.0 / step;
-    for (const auto& e : s.edge) {
-        const double rest = e.b * y + e.c;
-        const auto inside = [&](int i) { return e.a * (origin + i * step) + rest >= 0; };
-        if (e.a == 0) {
-            if (rest < 0) return false;
-            continue;
-        }
-        // Near enough to begin with; std::ceil() and std::floor() would be calls.
-        const double zero = (-rest / e.a - origin) * perStep;
-        if (e.a > 0) {
-            int i = ceilToInt(std::clamp(zero, from - 1.0, to + 2.0));
-            i = std::max(i, from);
-            while (i > from && inside(i - 1)) --i;
-            while (i <= to && !inside(i)) ++i;
-            from = i;
-        } else {
-            int i = floorToInt(std::clamp(zero, from - 2.0, to + 1.0));
-            i = std::min(i, to);
-            while (i < to && inside(i + 1)) ++i;
-            while (i >= from && !inside(i)) --i;
-            to = i;
-        }
-        if (from > to) return false;
-    }
-    return true;
-}
-
 void Rasterizer::drawSpan(std::uint32_t slot, double y, int from, int to, double step,
                           double origin, std::size_t line, Tile& tile) const {
     const SetUp& s = tile.setUps[slot];
-    if (!clipSpan(s, y, step, origin, from, to)) return;
+    if (!clipSpan(s.edge, y, step, origin, from, to)) return;
     const double base = s.nearness.b * y + s.nearness.c;
     const bool perspective = !camera_.orthographic;
     const bool holes = sampler_.seeThrough(s.triangle);
     float* const depth = tile.depth.data() + line;
     std::uint32_t* const ids = tile.ids.data() + line;
-    if (!holes && to - from >= kFew)
+    if (!holes && to - from >= kFewSamples)
         return nearerSamples({from, to, origin, step, s.nearness.a, base, perspective, slot}, depth,
                              ids);
     for (int i = from; i <= to; ++i) {
@@ -254,7 +211,7 @@ void Rasterizer::drawSpan(std::uint32_t slot, double y, int from, int to, double
 void Rasterizer::drawLayerSpan(std::uint32_t slot, double y, int from, int to, double step,
                                double origin, std::size_t line, Tile& tile) const {
     const SetUp& s = tile.setUps[slot];
-    if (!clipSpan(s, y, step, origin, from, to)) return;
+    if (!clipSpan(s.edge, y, step, origin, from, to)) return;
     const double base = s.nearness.b * y + s.nearness.c;
     const bool perspective = !camera_.orthographic;
     for (int i = from; i <= to; ++i) {
@@ -524,23 +481,15 @@ void Rasterizer::resolveCentres(int tileX, int tileY, const Tile& tile, RasterIm
     }
 }
 
-Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
+template <class Draw>
+Result<void> Rasterizer::forEachTile(int samples, Job& job, const Draw& draw) {
     const int w = camera_.width, h = camera_.height;
-    RasterImage out;
-    out.colour = Image<glm::vec4>(w, h, glm::vec4(0.0f));
-    out.depth = Image<float>(w, h, kNoDepth);
-    if (settings.lighting.on()) out.lit = out.colour;
-    if (settings.normals) out.normal = Image<glm::vec3>(w, h, glm::vec3(0.0f));
-    if (settings.materials && hasMetallicRoughness(mesh_))
-        out.metallicRoughness = Image<glm::vec2>(w, h, glm::vec2(0.0f));
-    if (settings.materials && emits(mesh_)) out.emissive = Image<glm::vec3>(w, h, glm::vec3(0.0f));
-
     project();
     const int tilesX = (w + kTile - 1) / kTile, tilesY = (h + kTile - 1) / kTile;
     std::vector<std::vector<std::uint32_t>> bins(static_cast<std::size_t>(tilesX) * tilesY);
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
         PictureBounds box;
-        if (!boxOf(t, settings.supersampling, box)) continue;
+        if (!boxOf(t, samples, box)) continue;
         const glm::ivec2 first = glm::ivec2(box.low) / kTile,
                          last = glm::min(glm::ivec2(box.high), glm::ivec2(w, h) - 1) / kTile;
         for (int ty = first.y; ty <= last.y; ++ty) {
@@ -557,19 +506,53 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
                 stopped = true;
                 return;
             }
-            const int tx = static_cast<int>(i % tilesX), ty = static_cast<int>(i / tilesX);
             tile.setUps.clear();
             for (const std::uint32_t triangle : bins[i]) {
                 SetUp s;
-                if (setUp(triangle, settings.supersampling, s)) tile.setUps.push_back(s);
+                if (setUp(triangle, samples, s)) tile.setUps.push_back(s);
             }
-            drawTile(tx, ty, settings.supersampling, tile);
-            shadeTile(tx, ty, settings, tile, out);
-            if (settings.supersampling > 1) drawTile(tx, ty, 1, tile);
-            resolveCentres(tx, ty, tile, out);
+            draw(static_cast<int>(i % tilesX), static_cast<int>(i / tilesX), tile);
         }
     });
-    if (stopped) STX_CHECK(job.checkCancelled());
+    if (stopped) return job.checkCancelled();
+    return {};
+}
+
+Result<std::vector<std::uint8_t>> Rasterizer::shown(int samples, Job& job) {
+    std::vector<std::uint8_t> out(mesh_.triangles.size());
+    const auto mark = [&](const Tile& tile) {
+        for (const auto slot : tile.ids)
+            if (slot != kNone)
+                std::atomic_ref(out[tile.setUps[slot].triangle])
+                    .store(1, std::memory_order_relaxed);
+    };
+    STX_CHECK(forEachTile(samples, job, [&](int tx, int ty, Tile& tile) {
+        drawTile(tx, ty, samples, tile);
+        mark(tile);
+        if (samples == 1) return;
+        drawTile(tx, ty, 1, tile);
+        mark(tile);
+    }));
+    return out;
+}
+
+Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
+    const int w = camera_.width, h = camera_.height;
+    RasterImage out;
+    out.colour = Image<glm::vec4>(w, h, glm::vec4(0.0f));
+    out.depth = Image<float>(w, h, kNoDepth);
+    if (settings.lighting.on()) out.lit = out.colour;
+    if (settings.normals) out.normal = Image<glm::vec3>(w, h, glm::vec3(0.0f));
+    if (settings.materials && hasMetallicRoughness(mesh_))
+        out.metallicRoughness = Image<glm::vec2>(w, h, glm::vec2(0.0f));
+    if (settings.materials && emits(mesh_)) out.emissive = Image<glm::vec3>(w, h, glm::vec3(0.0f));
+
+    STX_CHECK(forEachTile(settings.supersampling, job, [&](int tx, int ty, Tile& tile) {
+        drawTile(tx, ty, settings.supersampling, tile);
+        shadeTile(tx, ty, settings, tile, out);
+        if (settings.supersampling > 1) drawTile(tx, ty, 1, tile);
+        resolveCentres(tx, ty, tile, out);
+    }));
     if (cut_)
         job.noteOnce(fmt::format(
             "a pixel shows the nearest {} translucent surfaces; more lie behind each other in the "
@@ -578,44 +561,20 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
     return out;
 }
 
-/// What is brighter than white becomes white, under its coverage.
-void clip(Image<glm::vec4>& colour) {
-    parallelFor(0, colour.height(), 16, [&](int y) {
-        for (auto& c : colour.row(y)) c = glm::vec4(glm::min(glm::vec3(c), c.w), c.w);
-    });
-}
-
-Result<RasterImage> rasterisedMesh(const Mesh& mesh, const Camera& camera,
-                                   const RasterSettings& settings, Job& job) {
-    STX_TRY(auto out, Rasterizer(mesh, camera, settings).run(settings, job));
-    if (settings.lighting.beyondOne || !mayExceedWhite(mesh)) return out;
-    clip(out.colour);
-    clip(out.lit);
-    return out;
-}
-
 }  // namespace
 
-Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
-                              const RasterSettings& settings, Job& job) {
-    STX_CHECK(camera.check());
-    if (settings.supersampling < 1 || settings.supersampling > 8)
-        return fail(ErrorCode::usage, "supersampling is {}; 1 to 8 is possible",
-                    settings.supersampling);
-    STX_CHECK(job.limits.checkAllocation(static_cast<std::uint64_t>(camera.width) * camera.height,
-                                         32, "the picture"));
-    if (mesh.splats) {
-        STX_TRY(auto drawn, drawSplats(*mesh.splats, camera, settings.normals, job));
-        if (!settings.lighting.beyondOne) clip(drawn.colour);
-        const auto lit = settings.lighting.on() ? drawn.colour : Image<glm::vec4>();
-        return RasterImage{drawn.colour, lit, drawn.depth, drawn.normal, {}, {}};
-    }
-    STX_CHECK(job.limits.checkAllocation(mesh.triangles.size(), sizeof(SetUp), "the mesh"));
-    if (!mesh.points.empty()) {
-        const Mesh solid = pointsAsTriangles(mesh, camera, loosePoints(mesh));
-        return rasterisedMesh(solid, camera, settings, job);
-    }
-    return rasterisedMesh(mesh, camera, settings, job);
+Result<RasterImage> rasteriseTriangles(const Mesh& mesh, const Camera& camera,
+                                       const RasterSettings& settings, Job& job) {
+    return Rasterizer(mesh, camera, settings).run(settings, job);
+}
+
+Result<std::vector<std::uint8_t>> shownTriangles(const Mesh& mesh, const Camera& camera,
+                                                 const RasterSettings& settings, Job& job) {
+    return Rasterizer(mesh, camera, settings).shown(settings.supersampling, job);
+}
+
+std::uint64_t memoryOfTriangle() {
+    return sizeof(SetUp);
 }
 
 }  // namespace stx

@@ -58,10 +58,4 @@ struct LoosePoints {
 /// there are some, and at most a fiftieth of what all are in.
 [[nodiscard]] LoosePoints loosePoints(const Mesh& mesh);
 
-/// A mesh without loose points: each became a disc of triangles, facing outward from the camera's
-/// position (or, when orthographic, along `-forward`), or the half of a ball that faces there.
-/// Meshes without points come back as they are.
-[[nodiscard]] Mesh pointsAsTriangles(const Mesh& mesh, const Camera& camera,
-                                     const LoosePoints& shape);
-
 }  // namespace stx

@@ -9,6 +9,9 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
+#include <span>
+
+#include "lib/base/rounding.hpp"
 
 #ifndef STX_TILE_KERNELS_ONCE
 #define STX_TILE_KERNELS_ONCE
@@ -266,6 +269,49 @@ bool PixelSamples::colours(const MeshTexture& texture, const Affine* edges,
     s.edges = edges;
     s.uvs = uvs;
     return colours(texture, s, px, py, out);
+}
+
+bool clipSpan(const Affine* edges, double y, double step, double origin, int& from, int& to) {
+    // A few samples are asked one by one.
+    if (to - from < kFewSamples) {
+        const auto &p = edges[0], &q = edges[1], &r = edges[2];
+        const double atP = p.b * y + p.c, atQ = q.b * y + q.c, atR = r.b * y + r.c;
+        const auto inside = [&](int i) {
+            const double x = origin + i * step;
+            return p.a * x + atP >= 0 && q.a * x + atQ >= 0 && r.a * x + atR >= 0;
+        };
+        while (from <= to && !inside(from)) ++from;
+        while (from <= to && !inside(to)) --to;
+        return from <= to;
+    }
+    // Shrink [from, to] by each edge; the exact predicate decides at the ends, and being monotone
+    // in x it holds in between.
+    const double perStep = 1.0 / step;
+    for (const auto& e : std::span(edges, 3)) {
+        const double rest = e.b * y + e.c;
+        const auto inside = [&](int i) { return e.a * (origin + i * step) + rest >= 0; };
+        if (e.a == 0) {
+            if (rest < 0) return false;
+            continue;
+        }
+        // Near enough to begin with; std::ceil() and std::floor() would be calls.
+        const double zero = (-rest / e.a - origin) * perStep;
+        if (e.a > 0) {
+            int i = ceilToInt(std::clamp(zero, from - 1.0, to + 2.0));
+            i = std::max(i, from);
+            while (i > from && inside(i - 1)) --i;
+            while (i <= to && !inside(i)) ++i;
+            from = i;
+        } else {
+            int i = floorToInt(std::clamp(zero, from - 2.0, to + 1.0));
+            i = std::min(i, to);
+            while (i < to && inside(i + 1)) ++i;
+            while (i >= from && !inside(i)) --i;
+            to = i;
+        }
+        if (from > to) return false;
+    }
+    return true;
 }
 
 }  // namespace stx

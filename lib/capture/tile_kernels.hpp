@@ -34,6 +34,14 @@ struct Span {
 /// to `ids`. Both hold kSpanPadding values more than `span.to` names.
 void nearerSamples(const Span& span, float* depth, std::uint32_t* ids);
 
+/// Samples of a line that are too few to be worth more than a plain loop.
+constexpr int kFewSamples = 4;
+
+/// Shrinks [from, to] to the samples of a line, at x = origin + i * step, that are inside three
+/// edges (at least 0); false when none is.
+[[nodiscard]] bool clipSpan(const Affine* edges, double y, double step, double origin, int& from,
+                            int& to);
+
 /// A triangle in the samples of a tile.
 struct Patch {
     const Affine* edges = nullptr;  ///< three, at least 0 inside

@@ -348,6 +348,8 @@ Result<CoverProblem> coverProblem(const ViewTable& table, std::int64_t points, i
     const auto add = [&](std::size_t k) -> Result<void> {
         const std::vector<double> of = std::exchange(added[k], {});
         for (std::size_t i = 0; i < of.size(); ++i) density[i] += of[i];
+        job.progress(static_cast<std::int64_t>(k) + 1, static_cast<std::int64_t>(views),
+                     "looking at what views see");
         return {};
     };
     STX_CHECK(forEachView(table, peak::kSelect, job, look, add));

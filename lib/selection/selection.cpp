@@ -115,6 +115,7 @@ Result<Selection> selectViews(const ViewTable& table, const SelectSettings& sett
     // What there is to say is said when the chosen ones are read again.
     Job quiet;
     quiet.workFor(job);
+    quiet.onProgress = job.onProgress;
     std::vector<std::int64_t> points(table.count());
     if (const auto summaries = table.summaries(); !summaries.empty()) {
         std::ranges::transform(summaries, points.begin(), &ViewSummary::points);

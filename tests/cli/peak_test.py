@@ -526,6 +526,34 @@ def pruned_one_by_one(args, folder):
     return wrong
 
 
+# Of a cloud of points whose discs all at once would take four times as much, MiB.
+CLOUD_LIMIT = 60
+
+
+def clouds(args, folder):
+    """Points everywhere in a box, which become discs, and a hundred in each of a thousand places, which become half balls."""
+    wrong, numbers = [], random.Random(1)
+    box = struct.pack("<900000f", *(numbers.uniform(-1, 1) for _ in range(900000)))
+    for name, body in (("cloud", box), ("cloud of places", box[:12000] * 100)):
+        if args.only not in name:
+            continue
+        write(os.path.join(folder, "cloud.ply"), b"ply\nformat binary_little_endian 1.0\nelement vertex %d\n" % (len(body) // 12)
+              + b"property float x\nproperty float y\nproperty float z\nend_header\n" + body)
+        made = []
+        for limit in (16384, CLOUD_LIMIT):
+            done = must([args.stx, "convert", "cloud.ply", "-o", f"cloud{limit}.exr", "--views", "ring:2", "--size", "64x64",
+                         "--threads", "2", "--max-memory", str(limit)], folder)
+            made.append(files_of(os.path.join(folder, f"cloud{limit}.exr")))
+            peak = done.usage.ru_maxrss / 1024
+            if args.measure:
+                print(f"{name:25} {peak:6.1f} MiB at --max-memory {limit}", flush=True)
+            elif limit == CLOUD_LIMIT and peak > limit + PROGRAM:
+                wrong.append(f"{name}: {peak:.1f} MiB at --max-memory {limit}")
+        if made[0] != made[1]:
+            wrong.append(f"{name}: it is not that of a larger --max-memory")
+    return wrong
+
+
 def main():
     args = harness.arguments(__doc__, measure=0, pixels=9, views=1, only="")
     wrong = []
@@ -579,6 +607,7 @@ def main():
         wrong += cube_of_few(args, folder)
         wrong += film_of_few(args, folder)
         wrong += film_of_many(args, folder)
+        wrong += clouds(args, folder)
     print("\n".join(wrong))
     sys.exit(1 if wrong else 0)
 

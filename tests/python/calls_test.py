@@ -177,6 +177,32 @@ class Calls(Case):
             thread.join()
         np.testing.assert_array_equal(alone, together)
 
+    def test_calls_leave_no_memory_behind(self):
+        def resident():
+            with open("/proc/self/statm") as file:
+                return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+        def call(times):
+            for _ in range(times):
+                stx.compare("plate.png", "plate.png")
+        stx.render(stx.Bundle([plate(stx.Camera((8, 8), 9), 2.0)]), stx.Camera((8, 8), 9)).save("plate.png")
+        call(200)
+        before = resident()
+        call(800)
+        # A thread for each call took 4 MiB in all.
+        self.assertLess(resident() - before, 1 << 20)
+
+    def test_a_forked_process_works_on(self):
+        stx.open(MODEL)
+        child = os.fork()
+        if child == 0:
+            try:
+                stx.open(MODEL)
+                os._exit(0)
+            finally:
+                os._exit(1)
+        self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), 0)
+
     def test_the_environment_is_shown_unless_it_is_not_wanted(self):
         sky = np.zeros((8, 16, 3), np.uint8)
         sky[:] = (10, 200, 30)

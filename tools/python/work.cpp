@@ -1,8 +1,12 @@
 #include "tools/python/work.hpp"
 
+#include <condition_variable>
+#include <deque>
 #include <optional>
+#include <thread>
 
 #include <pybind11/stl.h>
+#include <unistd.h>
 
 namespace stx::python {
 namespace {
@@ -47,6 +51,39 @@ void tellInterpreter(JobHandle* handle, LastProgress& progress) {
     if (const auto news = progress.take()) handle->progress(news->done, news->total, news->what);
 }
 
+/// As many threads as calls worked at once. They stay: TBB does not use the memory of a thread that
+/// ended again, so that one for each call took 5 KiB of each.
+class Workers {
+  public:
+    void start(std::function<void()> work) {
+        const std::lock_guard lock(mutex_);
+        if (idle_ <= waiting_.size()) std::thread([this] { serve(); }).detach();
+        waiting_.push_back(std::move(work));
+        wake_.notify_one();
+    }
+
+  private:
+    [[noreturn]] void serve() {
+        std::unique_lock lock(mutex_);
+        for (;;) {
+            ++idle_;
+            wake_.wait(lock, [this] { return !waiting_.empty(); });
+            --idle_;
+            auto work = std::move(waiting_.front());
+            waiting_.pop_front();
+            lock.unlock();
+            work();
+            work = nullptr;
+            lock.lock();
+        }
+    }
+
+    std::mutex mutex_;
+    std::condition_variable wake_;
+    std::deque<std::function<void()>> waiting_;
+    std::size_t idle_ = 0;  ///< threads
+};
+
 std::unique_ptr<JobHandle> makeJob(double maxMemory, int threads, bool allowOutside,
                                    py::object progress) {
     // MiB that still are bytes in 64 bits.
@@ -71,6 +108,17 @@ void raise(const Error& error) {
     const py::object value = type(static_cast<int>(error.code), error.message, error.where);
     PyErr_SetObject(type.ptr(), value.ptr());
     throw py::error_already_set();
+}
+
+void startWork(std::function<void()> work) {
+    // Never deleted: its threads end with the process. A forked one has none of its parent's.
+    static Workers* workers = nullptr;
+    static pid_t process = 0;
+    if (const pid_t now = getpid(); process != now) {
+        workers = new Workers;
+        process = now;
+    }
+    workers->start(std::move(work));
 }
 
 void tell(JobHandle* handle, const std::vector<std::string>& notes) {

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <functional>
 #include <future>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -47,14 +48,21 @@ void tell(JobHandle* handle, const std::vector<std::string>& notes);
 void waitFor(Job& job, JobHandle* handle,
              const std::function<bool(std::chrono::milliseconds)>& ready);
 
-/// The value of work(), which a thread of its own does for `job`.
+/// Has another thread do work(), which must not throw, beside what others do. With the
+/// interpreter's lock.
+void startWork(std::function<void()> work);
+
+/// The value of work(), which another thread does for `job`.
 template <class F>
 auto runFor(Job& job, JobHandle* handle, F work) {
     if (handle) valueOf(handle->job.checkCancelled());
-    auto coming = std::async(std::launch::async, [&] {
+    // Of both threads: one may still leave it when the other has its value.
+    const auto task = std::make_shared<std::packaged_task<decltype(work())()>>([&] {
         const ThreadLimit threads(handle ? handle->threads : 0);
         return work();
     });
+    auto coming = task->get_future();
+    startWork([task] { (*task)(); });
     waitFor(job, handle, [&](std::chrono::milliseconds time) {
         return coming.wait_for(time) == std::future_status::ready;
     });

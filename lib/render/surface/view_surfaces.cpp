@@ -11,6 +11,7 @@
 #include "lib/model/peak_memory.hpp"
 #include "lib/refine/edge_colours.hpp"
 #include "lib/render/surface/prepare/cells.hpp"
+#include "lib/render/surface/reach.hpp"
 
 namespace stx {
 namespace {
@@ -26,8 +27,6 @@ constexpr double kDenser = 1.1;
 constexpr double kAtCrease = 0.6;
 /// What a background view's samples count.
 constexpr double kBehind = 0.25;
-/// Depths are of one surface within this share, as in splat mode, and steps of their code.
-constexpr double kSameDepth = 0.01, kSameSteps = 2.0;
 /// Pixels from an edge within which samples mix what is on both sides of it.
 constexpr int kMixed = 2;
 /// Squared distance of colours of which nothing is seen: a step and a half of 8 bits in each
@@ -54,21 +53,6 @@ constexpr glm::dvec3 kPlaces[] = {{1 / 3.0, 1 / 3.0, 1 / 3.0},
 struct Triangle {
     std::array<std::uint32_t, 3> corners;
 };
-
-/// Whether a view's picture may show some of a box, which is given by its corners in the world: not
-/// where all are beyond one of its sides, by a pixel or more, or behind it.
-bool mayShow(const Camera& c, std::span<const glm::dvec3> corners) {
-    std::array<bool, 5> beyond{true, true, true, true, true};
-    for (const glm::dvec3& corner : corners) {
-        const glm::dvec3 p = glm::conjugate(c.orientation) * (corner - c.position);
-        const double w = c.orthographic ? 1.0 : -p.z;
-        const double x = c.fx * p.x + c.cx * w, y = -c.fy * p.y + c.cy * w;
-        const double inside[] = {c.orthographic ? 1.0 : w, x + w, (c.width + 1) * w - x, y + w,
-                                 (c.height + 1) * w - y};
-        for (std::size_t k = 0; k < beyond.size(); ++k) beyond[k] = beyond[k] && inside[k] < 0;
-    }
-    return std::ranges::none_of(beyond, [](bool all) { return all; });
-}
 
 /// How far an eye goes to the side of a photograph, of the median distance: as behindPhoto() has it
 /// unless another distance is asked for.
@@ -113,7 +97,10 @@ OnePlace onePlaceOf(const SurfaceScene& scene) {
 class Maker {
   public:
     explicit Maker(const SurfaceScene& scene)
-        : scene_(scene), used_(scene.sources.size()), onePlace_(onePlaceOf(scene)) {}
+        : scene_(scene),
+          used_(scene.sources.size()),
+          reaches_(scene.sources.begin(), scene.sources.end()),
+          onePlace_(onePlaceOf(scene)) {}
 
     /// Before surfaceOf() of any. Triangles are found again then: those of all views are many.
     void prepare(std::size_t number) {
@@ -431,7 +418,7 @@ class Maker {
     }
 
     /// The other views whose pictures may show some of a block's triangles.
-    [[nodiscard]] std::vector<const Source*> othersAt(const Source& s, int bx, int by) const {
+    [[nodiscard]] std::vector<Reach> othersAt(const Source& s, int bx, int by) const {
         const SourceBlock& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
         // Corners are the middles of its pixels and of those beside it.
         const double x0 = bx * kBlock, y0 = by * kBlock, reach = kBlock + 1;
@@ -443,14 +430,16 @@ class Maker {
                              s.view->camera.unproject(x0 + (k & 1 ? reach : 0),
                                                       y0 + (k & 2 ? reach : 0), dist);
         }
-        std::vector<const Source*> out;
-        for (const Source& other : scene_.sources)
-            if (&other != &s && mayShow(other.view->camera, corners)) out.push_back(&other);
+        std::vector<Reach> out;
+        for (const Reach& other : reaches_)
+            if (&other.source() != &s && other.holds(corners) &&
+                mayShow(other.source().view->camera, corners))
+                out.push_back(other);
         return out;
     }
 
     [[nodiscard]] bool shownBetter(const Source& s, const Triangle& t,
-                                   std::span<const Source* const> others) const {
+                                   std::span<const Reach> others) const {
         std::array<glm::dvec3, 3> p;
         glm::ivec2 low(s.width, s.height), high(0);
         for (std::size_t k = 0; k < 3; ++k) {
@@ -480,13 +469,14 @@ class Maker {
     }
 
     /// Some other view sees the place from the same side, more densely by kDenser.
-    [[nodiscard]] bool anotherShows(std::span<const Source* const> others, glm::dvec3 world,
+    [[nodiscard]] bool anotherShows(std::span<const Reach> others, glm::dvec3 world,
                                     glm::dvec3 normal, double here, double atCrease) const {
-        for (const Source* other : others) {
-            const Camera& c = other->view->camera;
+        for (const Reach& other : others) {
+            if (!other.holds(world)) continue;
+            const Camera& c = other.source().view->camera;
             const glm::dvec3 ray = c.orthographic ? c.forward() : world - c.position;
             if (!(glm::dot(ray, normal) < 0)) continue;
-            if (density(*other, world, normal, atCrease) > kDenser * here) return true;
+            if (density(other.source(), world, normal, atCrease) > kDenser * here) return true;
         }
         return false;
     }
@@ -495,7 +485,7 @@ class Maker {
     [[nodiscard]] bool onSurfaceOfAnother(const Source& s, glm::dvec3 world) const {
         for (std::size_t k = 0; k < scene_.sources.size(); ++k) {
             const Source& other = scene_.sources[k];
-            if (&other == &s) continue;
+            if (&other == &s || !reaches_[k].holds(world)) continue;
             const Camera& c = other.view->camera;
             const glm::dvec3 inCamera = glm::conjugate(c.orientation) * (world - c.position);
             if (!c.orthographic && !(inCamera.z < 0)) continue;
@@ -510,6 +500,7 @@ class Maker {
 
     const SurfaceScene& scene_;
     std::vector<std::vector<bool>> used_;  ///< of each source: pixels that are corners
+    std::vector<Reach> reaches_;           ///< of each source
     OnePlace onePlace_;
 };
 

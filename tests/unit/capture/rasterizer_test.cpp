@@ -1,5 +1,8 @@
 #include "lib/capture/rasterizer.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "lib/base/parallel.hpp"
@@ -334,6 +337,70 @@ TEST(Capture, PointCloudsBecomeClosedSurfaces) {
     for (int y = 40; y < 56; ++y) {
         for (int x = 40; x < 56; ++x) EXPECT_NEAR(image->depth.at(x, y), 3.0, 0.1);
     }
+}
+
+/// A wall of points in layers, in places with several points, with squares in front and behind.
+Mesh layeredCloud(int side) {
+    Mesh mesh;
+    const auto add = [&](glm::vec3 at, glm::vec4 colour) {
+        mesh.positions.push_back(at);
+        mesh.colours.push_back(colour);
+        return static_cast<std::uint32_t>(mesh.positions.size() - 1);
+    };
+    // From the back, so that later ones hide those before; and each place twice.
+    for (int layer = 0; layer < 6; ++layer) {
+        for (int k = 0; k < side * side; ++k) {
+            const glm::vec2 at = glm::vec2(k % side, k / side) * (2.0f / side) - 1.0f;
+            const float wave = 0.1f * std::sin(5.0f * at.x) * std::cos(4.0f * at.y);
+            const auto shade = static_cast<float>(k % 7 + layer) / 13.0f;
+            mesh.points.push_back(add({at, 0.1f * static_cast<float>(layer / 2) + wave},
+                                      {shade, 1.0f - shade, 0, 1}));
+        }
+    }
+    for (const float z : {-0.3f, 0.4f}) {
+        const float low = z < 0 ? -1.2f : 0.1f, high = z < 0 ? 1.2f : 0.4f;
+        const auto a = add({low, low, z}, {0, 0, 1, 1}), b = add({high, low, z}, {0, 0, 1, 1}),
+                   c = add({high, high, z}, {1, 1, 1, 1});
+        mesh.triangles.emplace_back(a, b, c);
+        mesh.triangleMaterial.push_back(0);
+    }
+    mesh.materials.emplace_back();
+    return mesh;
+}
+
+TEST(Capture, CloudsInPiecesAreTheSamePictures) {
+    // Discs, and balls that are apart.
+    for (const int side : {60, 9}) {
+        const Mesh cloud = layeredCloud(side);
+        ASSERT_EQ(loosePoints(cloud).apart, side == 9);
+        for (const bool orthographic : {false, true}) {
+            const Camera camera = lookingAt({0.5, 0.3, 3}, 64, 0.8, orthographic);
+            RasterSettings settings;
+            settings.normals = true;
+            Job all, little;
+            little.limits.maxMemoryBytes = side == 60 ? 4u << 20 : 1u << 20;
+            const auto whole = rasterise(cloud, camera, settings, all);
+            const auto pieces = rasterise(cloud, camera, settings, little);
+            ASSERT_TRUE(whole && pieces) << (pieces ? "" : pieces.error().message);
+            const auto same = [](const auto& a, const auto& b) {
+                return std::ranges::equal(std::as_bytes(a.pixels()), std::as_bytes(b.pixels()));
+            };
+            EXPECT_TRUE(same(whole->colour, pieces->colour)) << side;
+            EXPECT_TRUE(same(whole->depth, pieces->depth)) << side;
+            EXPECT_TRUE(same(whole->normal, pieces->normal)) << side;
+        }
+    }
+}
+
+TEST(Capture, CloudsThatShowTooManyPointsAreRefused) {
+    const Mesh cloud = layeredCloud(60);
+    Job job;
+    job.limits.maxMemoryBytes = 256 << 10;
+    const auto image = rasterise(cloud, lookingAt({0.5, 0.3, 3}, 64), {}, job);
+    ASSERT_FALSE(image);
+    EXPECT_NE(image.error().message.find("the points that a picture shows would need"),
+              std::string::npos)
+        << image.error().message;
 }
 
 TEST(ViewLayout, ParsesAndRefuses) {

@@ -218,7 +218,16 @@ TEST(Selection, OneByOneIsThatOfAllInMemory) {
         const auto all = selectViews(bundle, settings, job);
         const auto notes = job.takeNotes();
         table.asked = 0;
+        std::vector<std::int64_t> told;
+        job.onProgress = [&](std::int64_t done, std::int64_t total, std::string_view what) {
+            EXPECT_EQ(total, 12);
+            EXPECT_EQ(what, "looking at what views see");
+            told.push_back(done);
+        };
         const auto each = selectViews(table, settings, job);
+        job.onProgress = nullptr;
+        ASSERT_EQ(told.size(), 12u);
+        EXPECT_TRUE(std::ranges::is_sorted(told));
         ASSERT_TRUE(all && each);
         EXPECT_EQ(job.takeNotes(), notes);
         EXPECT_EQ(table.asked, 3 * 12);

@@ -1,0 +1,49 @@
+#include <algorithm>
+
+#include "lib/base/parallel.hpp"
+#include "lib/capture/material_sampler.hpp"
+#include "lib/capture/triangles.hpp"
+#include "lib/splats/draw.hpp"
+
+namespace stx {
+namespace {
+
+/// What is brighter than white becomes white, under its coverage.
+void clip(Image<glm::vec4>& colour) {
+    parallelFor(0, colour.height(), 16, [&](int y) {
+        for (auto& c : colour.row(y)) c = glm::vec4(glm::min(glm::vec3(c), c.w), c.w);
+    });
+}
+
+Result<RasterImage> rasterisedMesh(const Mesh& mesh, const Camera& camera,
+                                   const RasterSettings& settings, Job& job) {
+    if (mesh.points.empty()) return rasteriseTriangles(mesh, camera, settings, job);
+    STX_TRY(const Mesh solid, pointsAsTriangles(mesh, camera, settings, job));
+    return rasteriseTriangles(solid, camera, settings, job);
+}
+
+}  // namespace
+
+Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
+                              const RasterSettings& settings, Job& job) {
+    STX_CHECK(camera.check());
+    if (settings.supersampling < 1 || settings.supersampling > 8)
+        return fail(ErrorCode::usage, "supersampling is {}; 1 to 8 is possible",
+                    settings.supersampling);
+    STX_CHECK(job.limits.checkAllocation(static_cast<std::uint64_t>(camera.width) * camera.height,
+                                         32, "the picture"));
+    if (mesh.splats) {
+        STX_TRY(auto drawn, drawSplats(*mesh.splats, camera, settings.normals, job));
+        if (!settings.lighting.beyondOne) clip(drawn.colour);
+        const auto lit = settings.lighting.on() ? drawn.colour : Image<glm::vec4>();
+        return RasterImage{drawn.colour, lit, drawn.depth, drawn.normal, {}, {}};
+    }
+    STX_CHECK(job.limits.checkAllocation(mesh.triangles.size(), memoryOfTriangle(), "the mesh"));
+    STX_TRY(auto out, rasterisedMesh(mesh, camera, settings, job));
+    if (settings.lighting.beyondOne || !mayExceedWhite(mesh)) return out;
+    clip(out.colour);
+    clip(out.lit);
+    return out;
+}
+
+}  // namespace stx
