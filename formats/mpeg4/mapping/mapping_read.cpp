@@ -15,6 +15,7 @@
 #include "formats/mpeg4/scene/interpolators.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/base/unique_names.hpp"
 #include "lib/geometry/frustum.hpp"
 
 namespace stx::mpeg4 {
@@ -335,12 +336,8 @@ class BundleReader {
         return name;
     }
     static void makeNamesUnique(Bundle& bundle) {
-        std::set<std::string> taken;
-        for (ReferenceView& view : bundle.views) {
-            const std::string base = view.name;
-            for (int i = 1; !taken.insert(view.name).second; ++i)
-                view.name = fmt::format("{}_{}", base, i);
-        }
+        UniqueNames names("_", 1);
+        for (ReferenceView& view : bundle.views) view.name = names.take(view.name);
     }
 
     Result<std::vector<ViewPlan>> makePlans(const ShownScene& shown) {
