@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "formats/exr/exr_file.hpp"
 #include "formats/files/files.hpp"
 #include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
 #include "formats/images/npy.hpp"
+#include "lib/base/unique_names.hpp"
 
 namespace stx::imagesets {
 
@@ -55,7 +55,7 @@ std::vector<glm::u16vec4> codedColours(const RgbaFloatImage& image) {
 
 std::vector<std::string> fileNames(const Bundle& bundle) {
     std::vector<std::string> names;
-    std::set<std::string> taken;
+    UniqueNames unique("_", 2);
     for (const ReferenceView& view : bundle.views) {
         std::string name;
         for (const char c : view.name) {
@@ -64,10 +64,7 @@ std::vector<std::string> fileNames(const Bundle& bundle) {
             name += fine ? c : '_';
         }
         if (name.empty()) name = "view";
-        name = name.substr(0, 100);
-        std::string unique = name;
-        for (int i = 2; !taken.insert(unique).second; ++i) unique = fmt::format("{}_{}", name, i);
-        names.push_back(std::move(unique));
+        names.push_back(unique.take(name.substr(0, 100)));
     }
     return names;
 }

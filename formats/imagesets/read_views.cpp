@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <atomic>
-#include <set>
 
 #include "formats/exr/environment_exr.hpp"
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "lib/background/behind_photo.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/base/unique_names.hpp"
 #include "lib/geometry/origin.hpp"
 #include "lib/model/depth_values.hpp"
 #include "lib/model/linear_views.hpp"
@@ -177,13 +177,9 @@ void leaveOut(const LoadedViews& loaded, SetDescription& set, Job& job) {
 }
 
 void makeNamesUnique(std::vector<ReferenceView>& views) {
-    std::set<std::string> taken;
-    for (ReferenceView& view : views) {
-        if (view.name.empty()) view.name = "view";
-        std::string name = view.name;
-        for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", view.name, i);
-        view.name = std::move(name);
-    }
+    UniqueNames names("_", 2);
+    for (ReferenceView& view : views)
+        view.name = names.take(view.name.empty() ? "view" : view.name);
 }
 
 glm::dvec3 findOrigin(Bundle& bundle, const SetDescription& set, Job& job) {

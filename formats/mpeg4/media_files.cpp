@@ -258,13 +258,11 @@ Result<void> loadMedia(Document& document, const std::vector<std::filesystem::pa
 
 void nameTracks(Document& document) {
     bool ours = false;
-    for (const CommandFrame& frame : document.frames)
-        for (const Command& command : frame.commands)
-            forEachNode(command, [&](const NodePtr& node) {
-                if (!node->is("WorldInfo")) return;
-                const auto& info = node->get<std::vector<std::string>>("info");
-                ours = ours || (!info.empty() && info.front() == kMadeByUs);
-            });
+    forEachNode(document.frames, [&](const NodePtr& node) {
+        if (!node->is("WorldInfo")) return;
+        const auto& info = node->get<std::vector<std::string>>("info");
+        ours = ours || (!info.empty() && info.front() == kMadeByUs);
+    });
     if (!ours) return;
     const auto roles = rolesOf(document);
     const auto done = forEachStream(document, [&](ElementaryStream& stream, int odId) {

@@ -134,20 +134,18 @@ class DocumentValidator {
     /// Object descriptors that some node of the scene, or a command, names; or a node of one type.
     std::set<int> namedDescriptors(std::string_view type = {}) const {
         std::set<int> named;
+        forEachNode(document_.frames, [&](const NodePtr& node) {
+            if (!type.empty() && !node->is(type)) return;
+            for (const Node::SetField& field : node->setFields) collectUrls(field.value, named);
+        });
+        if (!type.empty()) return named;
         for (const CommandFrame& frame : document_.frames)
-            for (const Command& command : frame.commands) {
-                forEachNode(command, [&](const NodePtr& node) {
-                    if (!type.empty() && !node->is(type)) return;
-                    for (const Node::SetField& field : node->setFields)
-                        collectUrls(field.value, named);
-                });
-                if (!type.empty()) continue;
+            for (const Command& command : frame.commands)
                 std::visit(
                     [&](const auto& c) {
                         if constexpr (requires { c.value; }) collectUrls(c.value, named);
                     },
                     command);
-            }
         return named;
     }
     static void collectUrls(const FieldValue& value, std::set<int>& ids) {

@@ -15,6 +15,7 @@
 #include "formats/mpeg4/scene/interpolators.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/base/unique_names.hpp"
 #include "lib/geometry/frustum.hpp"
 
 namespace stx::mpeg4 {
@@ -37,8 +38,9 @@ class BundleReader {
     };
 
     /// The object as a scene has it. With `still`, says what moves: the moment is all that is read.
-    Result<Bundle> read(const Scene& scene, const StreamImages& images, bool still) {
-        STX_TRY(const auto object, objectOf(scene, still));
+    Result<Bundle> read(const Scene& scene, const ShownScene& shown, const StreamImages& images,
+                        bool still) {
+        STX_TRY(const auto object, objectOf(scene, shown, still));
         return read(object, images);
     }
     Result<Bundle> read(const Object& object, const StreamImages& images) {
@@ -81,8 +83,7 @@ class BundleReader {
         return bundle;
     }
 
-    Result<Object> objectOf(const Scene& scene, bool still) {
-        STX_TRY(const auto shown, shownScene(scene.root, job_.limits));
+    Result<Object> objectOf(const Scene& scene, const ShownScene& shown, bool still) {
         if (!shown.leftOut.empty())
             job_.note(fmt::format("the scene has nodes that are no views; they are left out: {}",
                                   fmt::join(shown.leftOut, ", ")));
@@ -335,12 +336,8 @@ class BundleReader {
         return name;
     }
     static void makeNamesUnique(Bundle& bundle) {
-        std::set<std::string> taken;
-        for (ReferenceView& view : bundle.views) {
-            const std::string base = view.name;
-            for (int i = 1; !taken.insert(view.name).second; ++i)
-                view.name = fmt::format("{}_{}", base, i);
-        }
+        UniqueNames names("_", 1);
+        for (ReferenceView& view : bundle.views) view.name = names.take(view.name);
     }
 
     Result<std::vector<ViewPlan>> makePlans(const ShownScene& shown) {
@@ -445,12 +442,12 @@ class MomentViews : public ViewTable {
 }  // namespace
 
 Result<std::unique_ptr<ViewTable>> viewsOfMoment(std::shared_ptr<const Document> document,
-                                                 const Scene& scene,
+                                                 const Scene& scene, const ShownScene& shown,
                                                  std::shared_ptr<const StreamImages> images,
                                                  const SceneReadOptions& options, bool still,
                                                  Job& job) {
     BundleReader reader(*document, options, job);
-    STX_TRY(auto object, reader.objectOf(scene, still));
+    STX_TRY(auto object, reader.objectOf(scene, shown, still));
     auto headers = reader.headersOf(object, *images);
     if (!headers || headers->bundle.views.size() > static_cast<std::size_t>(job.limits.maxViews)) {
         STX_TRY(auto bundle, reader.read(object, *images));
@@ -469,7 +466,8 @@ Result<std::unique_ptr<ViewTable>> viewsFromScene(std::shared_ptr<const Document
         return fail(ErrorCode::invalidInput, "the presentation has no scene");
     STX_TRY(const auto scene, composeScene(document->frames, document->frames.front().time));
     STX_TRY(auto images, StreamImages::make(*document, options.folder, job.limits));
-    return viewsOfMoment(std::move(document), scene,
+    STX_TRY(const auto shown, shownScene(scene.root, job.limits));
+    return viewsOfMoment(std::move(document), scene, shown,
                          std::make_shared<StreamImages>(std::move(images)), options, true, job);
 }
 
@@ -479,29 +477,26 @@ Result<Bundle> bundleFromScene(const Document& document, const SceneReadOptions&
         return fail(ErrorCode::invalidInput, "the presentation has no scene");
     STX_TRY(const auto scene, composeScene(document.frames, document.frames.front().time));
     STX_TRY(const auto images, StreamImages::make(document, options.folder, job.limits));
-    return BundleReader(document, options, job).read(scene, images, true);
+    STX_TRY(const auto shown, shownScene(scene.root, job.limits));
+    return BundleReader(document, options, job).read(scene, shown, images, true);
 }
 
-Result<Bundle> bundleOfMoment(const Document& document, const Scene& scene,
+Result<Bundle> bundleOfMoment(const Document& document, const Scene& scene, const ShownScene& shown,
                               const StreamImages& images, const SceneReadOptions& options,
                               Job& job) {
-    return BundleReader(document, options, job).read(scene, images, false);
+    return BundleReader(document, options, job).read(scene, shown, images, false);
 }
 
 const char* nodeKindOf(const Document& document) {
     static constexpr std::array<const char*, 4> kKinds = {"SimpleTexture", "PointTexture",
                                                           "OctreeImage", "SimpleTextureV2"};
     int best = -1;
-    for (const auto& frame : document.frames) {
-        for (const auto& command : frame.commands) {
-            forEachNode(command, [&](const NodePtr& node) {
-                for (int i = 0; i < static_cast<int>(kKinds.size()); ++i) {
-                    if (node->is(kKinds[i]) || (i == 1 && node->is("PointTextureV2")))
-                        best = std::max(best, i);
-                }
-            });
+    forEachNode(document.frames, [&](const NodePtr& node) {
+        for (int i = 0; i < static_cast<int>(kKinds.size()); ++i) {
+            if (node->is(kKinds[i]) || (i == 1 && node->is("PointTextureV2")))
+                best = std::max(best, i);
         }
-    }
+    });
     return best < 0 ? "none" : kKinds[best];
 }
 

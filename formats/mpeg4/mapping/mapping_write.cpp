@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <span>
 
 #include "formats/mpeg4/mapping/background.hpp"
@@ -14,6 +13,7 @@
 #include "formats/mpeg4/mapping/view_notes.hpp"
 #include "formats/mpeg4/text/text_fields.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/base/unique_names.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -172,8 +172,7 @@ class SceneWriter {
     Result<NodePtr> octreeGroup(ViewNotes& notes) {
         STX_TRY(auto parts, octreeFromBundle(bundle_, options_.octreeLevels, job_));
         NodePtr octree = makeNode("OctreeImage");
-        octree->defName = "octree";
-        taken_.insert(octree->defName);
+        octree->defName = names_.take("octree");
         octree->set("octreeResolution", parts.resolution);
         octree->set("octree", std::move(parts.octree));
         NodeList images;
@@ -274,9 +273,7 @@ class SceneWriter {
         // N12 would be taken for a number.
         if (!isPlainName(defName) || idFromTextName(defName, 'N') != 0) defName = "view_" + defName;
         if (view.name.empty()) defName = fmt::format("view{}", i);
-        const std::string base = defName;
-        for (int n = 1; !taken_.insert(defName).second; ++n)
-            defName = fmt::format("{}_{}", base, n);
+        defName = names_.take(defName);
         if (defName != view.name && !view.name.empty()) notes.views[key].name = view.name;
         return defName;
     }
@@ -402,7 +399,7 @@ class SceneWriter {
     Job& job_;
     UpdateObjectDescriptors update_;
     Bounds bounds_;
-    std::set<std::string> taken_;
+    UniqueNames names_{"_", 1};
     PictureLoss loss_;
     bool dropped_ = false, vectorsLost_ = false, unmeasuredLost_ = false;
 };

@@ -1,6 +1,7 @@
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 
 #include <algorithm>
+#include <optional>
 
 #include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/mapping/media_clock.hpp"
@@ -33,17 +34,17 @@ class SceneSequence : public Sequence {
     }
 
     Result<Bundle> frame(std::size_t index, Job& job) override {
-        STX_TRY(const Scene* scene, sceneAt(index));
-        STX_TRY(auto bundle, bundleOfMoment(document_, *scene, images_, options_, job));
+        STX_TRY(const Scene* scene, sceneAt(index, job.limits));
+        STX_TRY(auto bundle, bundleOfMoment(document_, *scene, *shown_, images_, options_, job));
         setTime(bundle, index);
         bundle.environment = environment_;
         return bundle;
     }
     Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
-        STX_TRY(const Scene* scene, sceneAt(index));
+        STX_TRY(const Scene* scene, sceneAt(index, job.limits));
         // Both live as long as this.
         const std::shared_ptr<void> nobody;
-        STX_TRY(auto table, viewsOfMoment({nobody, &document_}, *scene, {nobody, &images_},
+        STX_TRY(auto table, viewsOfMoment({nobody, &document_}, *scene, *shown_, {nobody, &images_},
                                           options_, false, job));
         setTime(table->about(), index);
         table->about().environment = environment_;
@@ -51,13 +52,19 @@ class SceneSequence : public Sequence {
     }
 
   private:
-    /// With the pictures of that moment.
-    Result<const Scene*> sceneAt(std::size_t index) {
+    /// With what it shows and the pictures of that moment.
+    Result<const Scene*> sceneAt(std::size_t index, const Limits& limits) {
         const double now = timeline_.times[index] - start_;
         const double slack = timeline_.slack(timeline_.times[index]);
         STX_TRY(Scene * scene,
                 moments_.at(now, ticksBegun(now, document_.sceneStream.timescale, slack), slack));
         images_.setTime(now, slack);
+        if (!shown_ || !shown_->isStillOf(*scene)) {
+            shown_.reset();
+            STX_SET(shown_, shownScene(scene->root, limits));
+        }
+        scene->restructured = false;
+        scene->changed.clear();
         return scene;
     }
 
@@ -66,7 +73,8 @@ class SceneSequence : public Sequence {
     SceneReadOptions options_;
     MovingScene moments_;
     StreamImages images_;
-    double start_ = 0;  ///< of the film's clock
+    std::optional<ShownScene> shown_;  ///< of the moment that was asked for last
+    double start_ = 0;                 ///< of the film's clock
 };
 
 }  // namespace

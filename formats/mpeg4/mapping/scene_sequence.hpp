@@ -6,6 +6,7 @@
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/mapping/scene_timeline.hpp"
 #include "formats/mpeg4/mapping/stream_images.hpp"
+#include "formats/mpeg4/scene/scene_walk.hpp"
 #include "lib/model/sequence.hpp"
 
 namespace stx::mpeg4 {
@@ -20,15 +21,15 @@ namespace stx::mpeg4 {
 /// Bytes of decoded pictures that such a sequence keeps at most, where something moves.
 [[nodiscard]] std::uint64_t keptPictureBytes(const Limits& limits);
 
-/// The object of a presentation in a scene as it is at the moment of `images`; see
-/// bundleFromScene().
+/// The object of a presentation in a scene, which shows `shown`, as it is at the moment of
+/// `images`; see bundleFromScene().
 [[nodiscard]] Result<Bundle> bundleOfMoment(const Document& document, const Scene& scene,
-                                            const StreamImages& images,
+                                            const ShownScene& shown, const StreamImages& images,
                                             const SceneReadOptions& options, Job& job);
 
 /// The same as a table; see viewsFromScene(). With `still` a note says what moves.
 [[nodiscard]] Result<std::unique_ptr<ViewTable>> viewsOfMoment(
-    std::shared_ptr<const Document> document, const Scene& scene,
+    std::shared_ptr<const Document> document, const Scene& scene, const ShownScene& shown,
     std::shared_ptr<const StreamImages> images, const SceneReadOptions& options, bool still,
     Job& job);
 

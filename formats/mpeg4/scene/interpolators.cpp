@@ -126,6 +126,7 @@ class Events {
                 send(route.to, "value_changed", *result);
         } else if (keepsValue(route) && typeOf(value) == typeOf(route.to->value(route.toField))) {
             route.to->set(route.toField, value);
+            scene_.changed.insert(route.to.get());
             send(route.to, route.to->info->fields[route.toField].name, value);
         }
     }

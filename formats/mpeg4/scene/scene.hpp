@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -333,12 +334,21 @@ struct Scene {
     NodePtr root;
     std::vector<Route> routes;
     bool useNames = false;
+    /// What changed since who asks for moments has last cleared these: whether nodes came or went,
+    /// and the nodes of which fields have other values.
+    bool restructured = true;
+    std::unordered_set<const Node*> changed = {};
 };
 
 /// Calls `visit` for each node reachable from `root` once, parents before children, in field order.
 void forEachNode(const NodePtr& root, const std::function<void(const NodePtr&)>& visit);
 /// The same for every node in a command: targets, values, both ends of routes.
 void forEachNode(const Command& command, const std::function<void(const NodePtr&)>& visit);
+/// The same for every node of all commands, each once.
+void forEachNode(const std::vector<CommandFrame>& frames,
+                 const std::function<void(const NodePtr&)>& visit);
+/// The same of a command, but only where `visit` says so with what is below a node.
+void walkNodes(const Command& command, const std::function<bool(const NodePtr&)>& visit);
 
 /// Compares everything but node-valued fields bit for bit.
 [[nodiscard]] bool sameValue(const FieldValue& a, const FieldValue& b);

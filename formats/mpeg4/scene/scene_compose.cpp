@@ -23,44 +23,20 @@ bool isHeldWhileActive(const NodeInfo& node, int field) {
     return name == "startTime" || name == "cycleInterval" || name == "speed";
 }
 
-/// Whether nodes with textures of views are in what an insertion brings.
-bool holdsViews(const FieldValue& value) {
-    bool holds = false;
-    if (const NodePtr* root = std::get_if<NodePtr>(&value))
-        forEachNode(*root, [&](const NodePtr& node) {
-            holds = holds || node->info->find("diTexture") >= 0;
-        });
-    return holds;
-}
-
-/// Counts what a command may change; it may be more than it does.
-void count(const Command& command, SceneInTime::Structure& structure) {
-    const auto isNodes = [](const FieldValue& value) {
-        return std::holds_alternative<NodePtr>(value) || std::holds_alternative<NodeList>(value);
-    };
-    const bool isRoute = std::holds_alternative<InsertRoute>(command) ||
-                         std::holds_alternative<DeleteRoute>(command) ||
-                         std::holds_alternative<ReplaceRoute>(command);
-    if (isRoute || std::holds_alternative<ReplaceScene>(command) ||
-        std::holds_alternative<ReplaceNode>(command) || std::holds_alternative<DeleteNode>(command))
-        ++structure.routes;
-    if (isRoute) return;
-    bool changes = true;
-    if (const auto* c = std::get_if<ReplaceField>(&command)) changes = isNodes(c->value);
-    if (const auto* c = std::get_if<ReplaceIndexed>(&command)) changes = isNodes(c->value);
-    // What comes anew takes nothing away.
-    if (const auto* c = std::get_if<InsertNode>(&command)) changes = holdsViews(c->node);
-    if (const auto* c = std::get_if<InsertIndexed>(&command)) changes = holdsViews(c->value);
-    if (changes) ++structure.views;
+bool isNodes(const FieldValue& value) {
+    return std::holds_alternative<NodePtr>(value) || std::holds_alternative<NodeList>(value);
 }
 
 /// Node visits that all commands together may cost, so that a small hostile file cannot keep us
 /// busy: a scene of 10,000 nodes may be restructured some thousand times.
 constexpr std::uint64_t kMaxVisits = 20'000'000;
+/// Pointers that are compared in the time that a node is visited.
+constexpr std::uint64_t kComparedPerVisit = 20;
 
 class Composer {
   public:
-    explicit Composer(const ActiveNode& active) : active_(active) {}
+    Composer(const ActiveNode& active, SceneInTime::Structure& structure)
+        : active_(active), structure_(structure) {}
 
     /// Applies commands of the time `now` to what earlier calls left. `begin`: seconds that the
     /// times in their nodes count from.
@@ -110,15 +86,20 @@ class Composer {
     void copyAll(std::vector<Command>& commands) {
         std::vector<Node*> fresh;
         for (const Command& command : commands)
-            forEachNode(command, [&](const NodePtr& node) {
+            walkNodes(command, [&](const NodePtr& node) {
                 auto& copy = copies_[node.get()];
-                if (copy) return;
+                if (copy) return false;  // so is all below it
                 copy = std::make_shared<Node>(*node);
                 if (begin_ != 0) shiftTimes(*copy, begin_);
                 fresh.push_back(copy.get());
+                return true;
             });
         for (Node* copy : fresh)
             for (Node::SetField& field : copy->setFields) relink(field.value);
+        if (indexed_)
+            for (Node* copy : fresh) indexChildren(copy);
+        else
+            nodes_.insert(nodes_.end(), fresh.begin(), fresh.end());
         for (Command& command : commands)
             std::visit(
                 [&](auto& c) {
@@ -139,7 +120,7 @@ class Composer {
 
     Result<void> useBudget(std::uint64_t visits) {
         visits_ += visits;
-        if (visits_ > kMaxVisits)
+        if (visits_ + compared_ / kComparedPerVisit > kMaxVisits)
             return fail(ErrorCode::unsupported,
                         "the commands restructure the scene too often (more than {} node visits)",
                         kMaxVisits);
@@ -176,48 +157,136 @@ class Composer {
         return {};
     }
 
+    // ---- where nodes are
+
+    void indexChild(const NodePtr& child, Node* parent) {
+        if (child) parents_[child.get()].push_back(parent);
+    }
+    void indexValue(const FieldValue& value, Node* parent) {
+        if (const NodePtr* child = std::get_if<NodePtr>(&value)) indexChild(*child, parent);
+        if (const NodeList* list = std::get_if<NodeList>(&value))
+            for (const NodePtr& child : *list) indexChild(child, parent);
+    }
+    void indexChildren(Node* parent) {
+        for (const Node::SetField& field : parent->setFields) indexValue(field.value, parent);
+    }
+    /// Remembers that nodes came into a field. Those that go are found out when they are asked for.
+    void indexAdded(const FieldValue& value, Node* parent) {
+        if (indexed_) indexValue(value, parent);
+    }
+
+    bool holds(const FieldValue& value, const Node* child) {
+        const auto is = [&](const NodePtr& node) { return node.get() == child; };
+        ++compared_;
+        if (const NodePtr* node = std::get_if<NodePtr>(&value)) return is(*node);
+        const NodeList* list = std::get_if<NodeList>(&value);
+        if (list == nullptr) return false;
+        const auto found = std::ranges::find_if(*list, is);
+        compared_ += static_cast<std::uint64_t>(found - list->begin());
+        return found != list->end();
+    }
+
+    /// The nodes that have `child` in a field, each once.
+    const std::vector<Node*>& parentsOf(const Node* child) {
+        if (!indexed_) {
+            for (Node* node : nodes_) indexChildren(node);
+            nodes_ = {};
+            indexed_ = true;
+        }
+        std::vector<Node*>& parents = parents_[child];
+        std::unordered_set<const Node*> seen;
+        visits_ += parents.size();
+        std::erase_if(parents, [&](const Node* parent) {
+            return !seen.insert(parent).second ||
+                   std::ranges::none_of(parent->setFields, [&](const Node::SetField& field) {
+                       return holds(field.value, child);
+                   });
+        });
+        return parents;
+    }
+
+    /// Whether the root leads to a node.
+    Result<bool> isInScene(const Node* node) {
+        std::vector<const Node*> open{node};
+        std::unordered_set<const Node*> seen{node};
+        while (!open.empty()) {
+            const Node* next = open.back();
+            open.pop_back();
+            if (next == scene_.root.get()) return true;
+            for (const Node* parent : parentsOf(next))
+                if (seen.insert(parent).second) open.push_back(parent);
+            STX_CHECK(useBudget(1));
+        }
+        return false;
+    }
+
+    // ---- what changed
+
+    /// Notes that nodes came or went. `views`: whether a view or a part of one may be among them.
+    void noteNodes(bool views) {
+        scene_.restructured = true;
+        if (views) ++structure_.views;
+    }
+    void noteRoutes() { ++structure_.routes; }
+
+    /// Whether what is in a field of grouping nodes matters by the views in it alone; what is in
+    /// all others may be part of a view.
+    static bool isInSpace(Ndt type) { return type == Ndt::SF3DNode || type == Ndt::SF2DNode; }
+    Result<bool> holdsViews(const FieldValue& value) {
+        STX_TRY(const auto nodes, below(value));
+        return std::ranges::any_of(
+            nodes, [](const Node* node) { return node->info->find("diTexture") >= 0; });
+    }
+
     // ---- commands
 
     Result<void> apply(ReplaceScene& c) {
+        noteNodes(true);
+        noteRoutes();
+        routed_.clear();
+        for (const Route& route : c.routes) noteEnds(route);
         scene_.root = c.root;
         scene_.routes = c.routes;
         scene_.useNames = c.useNames;
         return {};
     }
 
-    /// Puts `replacement` wherever `target` is; null takes it out of lists.
+    void noteEnds(const Route& route) {
+        routed_.insert(route.from.get());
+        routed_.insert(route.to.get());
+    }
+
+    /// Puts `replacement` wherever `target` is in the scene; null takes it out of lists.
     Result<void> exchange(const NodePtr& target, const NodePtr& replacement) {
         STX_TRY(const auto inside, below(replacement));
-        std::vector<std::pair<NodePtr, int>> places;
-        std::uint64_t visits = 0;
-        Result<void> fits;
-        forEachNode(scene_.root, [&](const NodePtr& node) {
-            ++visits;
+        std::vector<std::pair<Node*, int>> places;
+        bool views = false;
+        const std::vector<Node*> parents = parentsOf(target.get());
+        for (Node* node : parents) {
+            STX_TRY(const bool shown, isInScene(node));
+            if (!shown) continue;
             for (const Node::SetField& field : node->setFields) {
-                bool here = false;
-                if (const NodePtr* child = std::get_if<NodePtr>(&field.value))
-                    here = *child == target;
-                if (const NodeList* list = std::get_if<NodeList>(&field.value))
-                    here = std::find(list->begin(), list->end(), target) != list->end();
-                if (!here) continue;
+                if (!holds(field.value, target.get())) continue;
                 places.emplace_back(node, field.index);
                 const FieldInfo& info = node->info->fields[field.index];
-                if (inside.contains(node.get()))
-                    fits = fail(ErrorCode::invalidInput,
+                if (inside.contains(node))
+                    return fail(ErrorCode::invalidInput,
                                 "the node that replaces {} '{}' contains its parent",
                                 target->info->name, target->defName);
-                else if (!mayStandIn(replacement.get(), info.nodeType))
-                    fits = fail(ErrorCode::invalidInput, "{} is not allowed in {}.{}",
+                if (!mayStandIn(replacement.get(), info.nodeType))
+                    return fail(ErrorCode::invalidInput, "{} is not allowed in {}.{}",
                                 replacement->info->name, node->info->name, info.name);
+                views = views || !isInSpace(info.nodeType);
             }
-        });
-        STX_CHECK(fits);
-        STX_CHECK(useBudget(visits));
+        }
+        if (!views) STX_SET(views, holdsViews(target));
+        if (!views) STX_SET(views, holdsViews(replacement));
         if (scene_.root == target) {
             if (!mayStandIn(replacement.get(), Ndt::SFTopNode))
                 return fail(ErrorCode::invalidInput, "{} may not be the root of a scene",
                             replacement->info->name);
             scene_.root = replacement;
+            views = true;
         } else if (places.empty()) {
             return fail(ErrorCode::invalidInput,
                         "the command names {} '{}' (id {}), which is not in the scene",
@@ -227,14 +296,25 @@ class Composer {
             FieldValue& value = node->edit(index);
             if (NodePtr* child = std::get_if<NodePtr>(&value)) *child = replacement;
             if (NodeList* list = std::get_if<NodeList>(&value)) {
+                compared_ += list->size();
                 if (replacement)
                     std::replace(list->begin(), list->end(), target, replacement);
                 else
                     std::erase(*list, target);
             }
+            indexAdded(replacement, node);
         }
-        // Routes stay where the new node has the same fields.
+        noteNodes(views);
+        exchangeInRoutes(target, replacement);
+        return useBudget(0);
+    }
+
+    /// Routes stay where the new node has the same fields.
+    void exchangeInRoutes(const NodePtr& target, const NodePtr& replacement) {
+        if (routed_.erase(target.get()) == 0) return;
         const bool keeps = replacement && sameType(*replacement->info, *target->info);
+        if (keeps) routed_.insert(replacement.get());
+        compared_ += scene_.routes.size();
         std::erase_if(scene_.routes, [&](Route& r) {
             if (r.from != target && r.to != target) return false;
             if (!keeps) return true;
@@ -242,7 +322,7 @@ class Composer {
             if (r.to == target) r.to = replacement;
             return false;
         });
-        return {};
+        noteRoutes();
     }
 
     Result<void> apply(ReplaceNode& c) { return exchange(c.target, c.replacement); }
@@ -265,6 +345,9 @@ class Composer {
         if (!c.target->set(c.field, c.value))
             return fail(ErrorCode::invalidInput, "{}.{} does not take this value",
                         c.target->info->name, c.target->info->fields[c.field].name);
+        indexAdded(c.value, c.target.get());
+        if (isNodes(c.value)) noteNodes(true);
+        scene_.changed.insert(c.target.get());
         return {};
     }
 
@@ -277,10 +360,13 @@ class Composer {
             STX_CHECK(checkNotInside(c.target, c.value));
             NodeList& list = std::get<NodeList>(c.target->edit(children));
             list.insert(list.end(), nodes->begin(), nodes->end());
+            indexAdded(c.value, c.target.get());
+            noteNodes(true);
         } else if (event == "removeChildren") {
             std::erase_if(std::get<NodeList>(c.target->edit(children)), [&](const NodePtr& node) {
                 return std::find(nodes->begin(), nodes->end(), node) != nodes->end();
             });
+            noteNodes(true);
         }
         return {};
     }
@@ -317,7 +403,8 @@ class Composer {
             node && !mayStandIn(node->get(), info.nodeType))
             return fail(ErrorCode::invalidInput, "{} is not allowed in {}.{}", (*node)->info->name,
                         target->info->name, info.name);
-        return std::visit(
+        FieldValue gone;
+        auto done = std::visit(
             [&](auto& list) -> Result<void> {
                 if constexpr (kIsList<std::decay_t<decltype(list)>>) {
                     using Item = typename std::decay_t<decltype(list)>::value_type;
@@ -329,6 +416,8 @@ class Composer {
                         return fail(ErrorCode::invalidInput,
                                     "index {} is outside {}.{}, which has {} items", at,
                                     target->info->name, info.name, size);
+                    if constexpr (std::is_same_v<Item, NodePtr>)
+                        if (what != Change::insert) gone = list[at];
                     if (what == Change::remove)
                         list.erase(list.begin() + at);
                     else if (what == Change::insert)
@@ -339,20 +428,34 @@ class Composer {
                 return {};
             },
             target->edit(field));
+        STX_CHECK(done);
+        scene_.changed.insert(target.get());
+        if (!isNodes(item) && !isNodes(gone)) return {};
+        indexAdded(item, target.get());
+        bool views = !isInSpace(info.nodeType);
+        if (!views) STX_SET(views, holdsViews(gone));
+        if (!views) STX_SET(views, holdsViews(item));
+        noteNodes(views);
+        return {};
     }
 
     Result<void> apply(InsertRoute& c) {
         STX_CHECK(useBudget(1));
+        noteRoutes();
+        noteEnds(c.route);
         scene_.routes.push_back(c.route);
         return {};
     }
     Result<void> apply(DeleteRoute& c) {
         STX_CHECK(useBudget(scene_.routes.size()));
+        noteRoutes();
         std::erase_if(scene_.routes, [&](const Route& r) { return r.id == c.routeId; });
         return {};
     }
     Result<void> apply(ReplaceRoute& c) {
         STX_CHECK(useBudget(scene_.routes.size()));
+        noteRoutes();
+        noteEnds(c.route);
         for (Route& route : scene_.routes)
             if (route.id == c.routeId) route = c.route;
         return {};
@@ -360,10 +463,16 @@ class Composer {
 
     Scene scene_;
     std::unordered_map<const Node*, NodePtr> copies_;
-    std::uint64_t visits_ = 0;
+    std::vector<Node*> nodes_;  ///< all copies, as they came, until they are indexed
+    bool indexed_ = false;      ///< scenes of which no node is exchanged never are
+    /// The nodes that have one in a field, and some that had it there.
+    std::unordered_map<const Node*, std::vector<Node*>> parents_;
+    std::unordered_set<const Node*> routed_;  ///< ends of routes, and some that were
+    std::uint64_t visits_ = 0, compared_ = 0;
     std::size_t count_ = 0;  ///< of commands
     double now_ = 0, begin_ = 0;
     const ActiveNode& active_;
+    SceneInTime::Structure& structure_;
     std::unordered_set<const Node*> wereActive_;
 };
 
@@ -423,7 +532,7 @@ Result<Scene*> SceneInTime::at(std::uint64_t until) {
     Impl& i = *impl_;
     const bool back = i.next > 0 && i.frames[i.order[i.next - 1]].time > until;
     if (!i.composer || back) {
-        i.composer = std::make_unique<Composer>(i.active);
+        i.composer = std::make_unique<Composer>(i.active, i.structure);
         i.next = 0;
         ++i.structure.views;
         ++i.structure.routes;
@@ -431,7 +540,6 @@ Result<Scene*> SceneInTime::at(std::uint64_t until) {
     for (; i.next < i.order.size() && i.frames[i.order[i.next]].time <= until; ++i.next) {
         const CommandFrame& frame = i.frames[i.order[i.next]];
         const double now = i.timescale == 0 ? 0 : static_cast<double>(frame.time) / i.timescale;
-        for (const Command& command : frame.commands) count(command, i.structure);
         if (auto done = i.composer->run(frame.commands, now, i.timesFromStart ? 0 : now); !done) {
             restart();
             return tl::unexpected(done.error());

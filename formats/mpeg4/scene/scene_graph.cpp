@@ -10,7 +10,9 @@
 namespace stx::mpeg4 {
 namespace {
 
-using Visit = std::function<void(const NodePtr&)>;
+/// Whether the walk goes on below a node.
+using Visit = std::function<bool(const NodePtr&)>;
+using VisitAll = std::function<void(const NodePtr&)>;
 
 /// Calls `take` with each node of a value, NULLs included.
 template <class Take>
@@ -57,7 +59,7 @@ class Walk {
             const NodePtr* node = stack_.back();
             stack_.pop_back();
             if (!seen_.insert(node->get()).second) continue;
-            visit_(*node);
+            if (!visit_(*node)) continue;
             // Reversed, so that the first child is on top of the stack.
             const std::size_t bottom = stack_.size();
             eachChild(**node, [&](const NodePtr& child) { push(child); });
@@ -97,11 +99,35 @@ bool sameBits(const std::vector<T>& a, const std::vector<T>& b) {
 
 }  // namespace
 
-void forEachNode(const NodePtr& root, const Visit& visit) {
-    Walk(visit).from(root);
+namespace {
+
+Visit andAllBelow(const VisitAll& visit) {
+    return [&visit](const NodePtr& node) {
+        visit(node);
+        return true;
+    };
 }
 
-void forEachNode(const Command& command, const Visit& visit) {
+}  // namespace
+
+void forEachNode(const NodePtr& root, const VisitAll& visit) {
+    const Visit each = andAllBelow(visit);
+    Walk(each).from(root);
+}
+
+void forEachNode(const Command& command, const VisitAll& visit) {
+    walkNodes(command, andAllBelow(visit));
+}
+
+void forEachNode(const std::vector<CommandFrame>& frames, const VisitAll& visit) {
+    const Visit each = andAllBelow(visit);
+    Walk walk(each);
+    for (const CommandFrame& frame : frames)
+        for (const Command& command : frame.commands)
+            eachRoot(command, [&](const NodePtr& root) { walk.from(root); });
+}
+
+void walkNodes(const Command& command, const Visit& visit) {
     Walk walk(visit);
     eachRoot(command, [&](const NodePtr& root) { walk.from(root); });
 }
@@ -248,9 +274,10 @@ struct Mentions {
 
 Mentions mentionsOf(const std::vector<CommandFrame>& frames) {
     Mentions m;
-    const std::function<void(const NodePtr&)> visit = [&](const NodePtr& node) {
+    const Visit visit = [&](const NodePtr& node) {
         m.inOrder.push_back(node.get());
         eachChild(*node, [&](const NodePtr& child) { m.use(child); });
+        return true;
     };
     Walk walk(visit);
     for (const CommandFrame& frame : frames)

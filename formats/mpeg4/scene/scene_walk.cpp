@@ -1,24 +1,103 @@
 #include "formats/mpeg4/scene/scene_walk.hpp"
 
+#include <algorithm>
+#include <optional>
 #include <unordered_map>
 
 namespace stx::mpeg4 {
 namespace {
 
+/// What a type of node is to the walk.
+enum class Role {
+    view,
+    background,
+    info,
+    choice,
+    levels,
+    transform,
+    group,       ///< whose children are where they would be without it
+    otherGroup,  ///< that turns, moves or chooses its children by itself
+    setting,     ///< shows nothing, as clocks and what they drive
+    shape,
+    other,
+};
+
+Role roleOf(const NodeInfo& type) {
+    static const std::unordered_map<std::string_view, Role> kRoles = {
+        {"DepthImage", Role::view},
+        {"DepthImageV2", Role::view},
+        {"OctreeImage", Role::view},
+        {"Background", Role::background},
+        {"WorldInfo", Role::info},
+        {"Switch", Role::choice},
+        {"LOD", Role::levels},
+        {"Transform", Role::transform},
+        {"Group", Role::group},
+        {"OrderedGroup", Role::group},
+        {"Layer2D", Role::group},
+        {"Layer3D", Role::group},
+        {"Anchor", Role::group},
+        {"Collision", Role::group},
+        {"Viewpoint", Role::setting},
+        {"Viewport", Role::setting},
+        {"NavigationInfo", Role::setting},
+        {"QuantizationParameter", Role::setting},
+        {"TimeSensor", Role::setting},
+        {"Valuator", Role::setting},
+        {"Shape", Role::shape}};
+    if (const auto found = kRoles.find(type.name); found != kRoles.end()) return found->second;
+    const int children = type.find("children");
+    if (children >= 0 && type.fields[children].type == FieldType::MFNode) return Role::otherGroup;
+    return type.name.find("Interpolator") != std::string::npos ? Role::setting : Role::other;
+}
+
+/// Where a node is. Its matrix is made when something is met that has a place: most Transforms of
+/// a scene may have no view in them.
+class Place {
+  public:
+    Place() : worldFromLocal_(1.0), turn_(glm::dquat(1.0, 0.0, 0.0, 0.0)) {}  // the world itself
+    Place(Place& above, const Node& transform) : above_(&above), transform_(&transform) {}
+
+    const glm::dmat4& worldFromLocal() {
+        if (!worldFromLocal_)
+            worldFromLocal_ =
+                above_->worldFromLocal() *
+                transformMatrix(transform_->get<glm::vec3>("center"),
+                                axisAngle(transform_->get<Rotation>("rotation")),
+                                transform_->get<glm::vec3>("scale"),
+                                axisAngle(transform_->get<Rotation>("scaleOrientation")),
+                                transform_->get<glm::vec3>("translation"));
+        return *worldFromLocal_;
+    }
+    /// Of all Transforms above, without what they scale and move.
+    const glm::dquat& turn() {
+        if (!turn_)
+            turn_ = above_->turn() *
+                    quatFromAxisAngle(axisAngle(transform_->get<Rotation>("rotation")));
+        return *turn_;
+    }
+
+  private:
+    Place* above_ = nullptr;
+    const Node* transform_ = nullptr;
+    std::optional<glm::dmat4> worldFromLocal_;
+    std::optional<glm::dquat> turn_;
+};
+
 class Walker {
   public:
     Walker(const Limits& limits, ShownScene& scene) : limits_(limits), scene_(scene) {}
 
-    Result<void> visit(const NodePtr& node, const glm::dmat4& world, int parent, int depth) {
+    Result<void> visit(const NodePtr& node, Place& place, int parent, int depth) {
         if (!node) return {};
         path_.push_back(node.get());
-        auto done = visitNode(node, world, parent, depth);
+        auto done = visitNode(node, place, parent, depth);
         path_.pop_back();
         return done;
     }
 
   private:
-    Result<void> visitNode(const NodePtr& node, const glm::dmat4& world, int parent, int depth) {
+    Result<void> visitNode(const NodePtr& node, Place& place, int parent, int depth) {
         // A few nodes that USE each other in turn can be shown in any number of places.
         if (++visits_ > kMaxVisits)
             return fail(ErrorCode::invalidInput,
@@ -28,52 +107,64 @@ class Walker {
             return fail(ErrorCode::invalidInput, "nodes nest deeper than {}", limits_.maxNesting);
         const std::string& type = node->info->name;
         if (node->proto) {
+            scene_.settledBy.insert(node.get());
             if (holdsClock(*node->proto)) scene_.withClocks.insert(type);
             std::size_t copied = 0;
             const NodePtr body = bodyOf(*node, copied);
             visits_ += static_cast<std::int64_t>(copied);
-            if (body) return visit(body, world, parent, depth + 1);
+            if (body) return visit(body, place, parent, depth + 1);
             scene_.leftOut.insert(type);
-        } else if (type == "DepthImage" || type == "DepthImageV2" || type == "OctreeImage") {
-            if (scene_.nodes.size() >= static_cast<std::size_t>(limits_.maxViews))
-                return fail(ErrorCode::invalidInput, "the scene shows more than {} views",
-                            limits_.maxViews);
-            scene_.nodes.push_back({node, world, parent});
-            scene_.above.insert(path_.begin(), path_.end());
-        } else if (type == "Background") {
-            scene_.backgrounds.push_back({node, turn_});
-        } else if (type == "WorldInfo") {
-            const auto& title = node->get<std::string>("title");
-            if (scene_.title.empty()) scene_.title = title;
-            scene_.infos.push_back({node->get<std::vector<std::string>>("info"), world, parent});
-        } else if (type == "Switch") {
-            const auto& choice = node->get<NodeList>("choice");
-            const auto chosen = node->get<std::int32_t>("whichChoice");
-            if (chosen >= 0 && static_cast<std::size_t>(chosen) < choice.size())
-                return visit(choice[chosen], world, ++groups_, depth + 1);
-        } else if (type == "LOD") {
-            const auto& levels = node->get<NodeList>("level");
-            if (!levels.empty()) return visitAsGroup(*node, {levels[0]}, world, depth);
-        } else if (const auto* children = childrenOf(*node)) {
-            if (!isPlainGroup(type)) return visitAsGroup(*node, *children, world, depth);
-            glm::dmat4 here = world;
-            const glm::dquat turn = turn_;
-            if (type == "Transform") {
-                turn_ = turn_ * quatFromAxisAngle(axisAngle(node->get<Rotation>("rotation")));
-                here = world * transformMatrix(node->get<glm::vec3>("center"),
-                                               axisAngle(node->get<Rotation>("rotation")),
-                                               node->get<glm::vec3>("scale"),
-                                               axisAngle(node->get<Rotation>("scaleOrientation")),
-                                               node->get<glm::vec3>("translation"));
+            return {};
+        }
+        const Type& known = typeOf(*node->info);
+        switch (known.role) {
+            case Role::view:
+                if (scene_.nodes.size() >= static_cast<std::size_t>(limits_.maxViews))
+                    return fail(ErrorCode::invalidInput, "the scene shows more than {} views",
+                                limits_.maxViews);
+                scene_.nodes.push_back({node, place.worldFromLocal(), parent});
+                scene_.above.insert(path_.begin(), path_.end());
+                return {};
+            case Role::background:
+                scene_.backgrounds.push_back({node, place.turn()});
+                scene_.settledBy.insert(path_.begin(), path_.end());
+                return {};
+            case Role::info: {
+                const auto& title = node->get<std::string>("title");
+                if (scene_.title.empty()) scene_.title = title;
+                scene_.infos.push_back(
+                    {node->get<std::vector<std::string>>("info"), place.worldFromLocal(), parent});
+                scene_.settledBy.insert(path_.begin(), path_.end());
+                return {};
             }
-            auto done = visitAll(*children, here, depth);
-            turn_ = turn;
-            return done;
-        } else if (!isSetting(type)) {
-            scene_.leftOut.insert(type);
-            if (type == "Shape")
+            case Role::choice: {
+                scene_.settledBy.insert(node.get());
+                const auto& choice = node->get<NodeList>("choice");
+                const auto chosen = node->get<std::int32_t>("whichChoice");
+                if (chosen < 0 || static_cast<std::size_t>(chosen) >= choice.size()) return {};
+                return visit(choice[chosen], place, ++groups_, depth + 1);
+            }
+            case Role::levels: {
+                const auto& levels = node->get<NodeList>("level");
+                if (levels.empty()) return {};
+                return visitAsGroup(*node, {levels[0]}, place, depth);
+            }
+            case Role::group:
+                return visitAll(childrenOf(*node, known), place, depth);
+            case Role::transform: {
+                Place here(place, *node);
+                return visitAll(childrenOf(*node, known), here, depth);
+            }
+            case Role::otherGroup:
+                return visitAsGroup(*node, childrenOf(*node, known), place, depth);
+            case Role::setting:
+                return {};
+            case Role::shape:
                 if (const NodePtr& geometry = node->get<NodePtr>("geometry"))
                     scene_.leftOut.insert(geometry->info->name);
+                [[fallthrough]];
+            case Role::other:
+                scene_.leftOut.insert(type);
         }
         return {};
     }
@@ -99,35 +190,28 @@ class Walker {
         return holds;
     }
 
-    /// Settings, clocks and what they drive show nothing by themselves.
-    static bool isSetting(std::string_view type) {
-        for (const std::string_view setting : {"QuantizationParameter", "Viewpoint", "Viewport",
-                                               "NavigationInfo", "TimeSensor", "Valuator"})
-            if (type == setting) return true;
-        return type.find("Interpolator") != std::string_view::npos;
+    struct Type {
+        Role role = Role::other;
+        int children = -1;  ///< the field
+    };
+    const Type& typeOf(const NodeInfo& info) {
+        const auto [entry, fresh] = types_.try_emplace(&info);
+        if (fresh) entry->second = {roleOf(info), info.find("children")};
+        return entry->second;
     }
-    /// Groups whose children are where they would be without it, but for Transform.
-    static bool isPlainGroup(std::string_view type) {
-        for (const std::string_view group :
-             {"Group", "OrderedGroup", "Transform", "Layer2D", "Layer3D", "Anchor", "Collision"})
-            if (type == group) return true;
-        return false;
-    }
-    static const NodeList* childrenOf(const Node& node) {
-        const int index = node.info->find("children");
-        return index < 0 ? nullptr : std::get_if<NodeList>(&node.value(index));
+    static const NodeList& childrenOf(const Node& node, const Type& type) {
+        return std::get<NodeList>(node.value(type.children));
     }
 
-    Result<void> visitAll(const NodeList& children, const glm::dmat4& world, int depth) {
+    Result<void> visitAll(const NodeList& children, Place& place, int depth) {
         const int group = ++groups_;
-        for (const NodePtr& child : children) STX_CHECK(visit(child, world, group, depth + 1));
+        for (const NodePtr& child : children) STX_CHECK(visit(child, place, group, depth + 1));
         return {};
     }
 
-    Result<void> visitAsGroup(const Node& node, const NodeList& children, const glm::dmat4& world,
-                              int depth) {
+    Result<void> visitAsGroup(const Node& node, const NodeList& children, Place& place, int depth) {
         const std::size_t before = scene_.nodes.size();
-        STX_CHECK(visitAll(children, world, depth));
+        STX_CHECK(visitAll(children, place, depth));
         if (scene_.nodes.size() > before) scene_.asGroups.insert(node.info->name);
         return {};
     }
@@ -135,10 +219,10 @@ class Walker {
     static constexpr std::int64_t kMaxVisits = 1 << 21;
     const Limits& limits_;
     ShownScene& scene_;
-    std::vector<const Node*> path_;        ///< from the root to the node that is visited
-    glm::dquat turn_{1.0, 0.0, 0.0, 0.0};  ///< of all Transforms above the node that is visited
+    std::vector<const Node*> path_;  ///< from the root to the node that is visited
     std::int64_t visits_ = 0;
     std::unordered_map<const Proto*, bool> clocks_;  ///< whether one is inside
+    std::unordered_map<const NodeInfo*, Type> types_;
     int groups_ = 0;
 };
 
@@ -146,8 +230,15 @@ class Walker {
 
 Result<ShownScene> shownScene(const NodePtr& root, const Limits& limits) {
     ShownScene scene;
-    STX_CHECK(Walker(limits, scene).visit(root, glm::dmat4(1.0), 0, 1));
+    Place world;
+    STX_CHECK(Walker(limits, scene).visit(root, world, 0, 1));
     return scene;
+}
+
+bool ShownScene::isStillOf(const Scene& scene) const {
+    return !scene.restructured && std::ranges::none_of(scene.changed, [&](const Node* node) {
+        return above.contains(node) || settledBy.contains(node);
+    });
 }
 
 }  // namespace stx::mpeg4

@@ -40,11 +40,18 @@ struct ShownScene {
     /// The Backgrounds in the order they are met; the first is bound.
     std::vector<ShownBackground> backgrounds;
     std::unordered_set<const Node*> above;  ///< the nodes that one of `nodes` is in
+    /// Other nodes whose fields say what is shown and where: those that a WorldInfo or Background
+    /// is in, Switches, instances of PROTOs.
+    std::unordered_set<const Node*> settledBy;
     std::set<std::string> leftOut;  ///< types of nodes that are no views, groups or settings
     /// Types of grouping nodes that turn, move or choose their children; read as plain groups.
     std::set<std::string> asGroups;
     /// PROTOs of which instances are shown, and that have TimeSensors inside.
     std::set<std::string> withClocks;
+
+    /// Whether this is what the scene shows still, of which it was made when its changes were last
+    /// cleared.
+    [[nodiscard]] bool isStillOf(const Scene& scene) const;
 };
 [[nodiscard]] Result<ShownScene> shownScene(const NodePtr& root, const Limits& limits);
 

@@ -187,20 +187,16 @@ TextNames TextNames::ofBody(const Proto& proto) {
 
 void TextNames::nameAll(const std::vector<CommandFrame>& frames) {
     const NodeIds ids = assignNodeIds(frames);
-    for (const CommandFrame& frame : frames) {
-        for (const Command& command : frame.commands) {
-            forEachNode(command, [&](const NodePtr& node) {
-                if (names_.contains(node.get())) return;
-                std::string text = textNameOf(*node);
-                if (text.empty()) {
-                    const auto id = ids.nodes.find(node.get());
-                    if (id == ids.nodes.end()) return;
-                    text = nameOfId('N', id->second);
-                }
-                names_[node.get()] = uniqueName(std::move(text));
-            });
+    forEachNode(frames, [&](const NodePtr& node) {
+        if (names_.contains(node.get())) return;
+        std::string text = textNameOf(*node);
+        if (text.empty()) {
+            const auto id = ids.nodes.find(node.get());
+            if (id == ids.nodes.end()) return;
+            text = nameOfId('N', id->second);
         }
-    }
+        names_[node.get()] = uniqueName(std::move(text));
+    });
 }
 
 /// A name that would not read back as itself: other characters give way to '_'.

@@ -8,12 +8,10 @@ namespace {
 
 /// Gives the nodes of `frames` the ids that they are coded with.
 void keepIds(const std::vector<CommandFrame>& frames, const NodeIds& ids) {
-    for (const CommandFrame& frame : frames)
-        for (const Command& command : frame.commands)
-            forEachNode(command, [&](const NodePtr& node) {
-                if (const auto id = ids.nodes.find(node.get()); id != ids.nodes.end())
-                    node->defId = id->second;
-            });
+    forEachNode(frames, [&](const NodePtr& node) {
+        if (const auto id = ids.nodes.find(node.get()); id != ids.nodes.end())
+            node->defId = id->second;
+    });
 }
 
 /// The ids of a scene or of the body of a PROTO, of which buffers bring more.
