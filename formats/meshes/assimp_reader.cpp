@@ -467,13 +467,14 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
     if (format == AssimpFormat::fbx) STX_CHECK(checkFbxClaims(bytes, limits));
     if (format == AssimpFormat::stl) STX_CHECK(checkStlEnd(bytes));
     try {
-        std::set<std::string> bare;
+        ObjFaces faces;
         std::optional<Bytes> usual;
         if (format == AssimpFormat::obj) {
-            bare = materialsOfBareFaces(bytes);
+            faces = objFaces(bytes);
             usual = withLeadingZeros(bytes);
-            if (auto smooth = withSmoothNormals(usual ? ByteSpan(*usual) : bytes))
-                usual = std::move(smooth);
+            if (faces.smoothWithoutNormals)
+                if (auto smooth = withSmoothNormals(usual ? ByteSpan(*usual) : bytes))
+                    usual = std::move(smooth);
         }
         if (format == AssimpFormat::stl) {
             usual = lowerCaseStl(bytes);
@@ -533,7 +534,7 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
                 "'{}' is bound to several sets of texture coordinates; all textures have the first",
                 collada.boundTwice));
         return SceneConverter(scene, format, files, side, plain ? plain->origin : glm::dvec3(0.0),
-                              std::move(bare))
+                              std::move(faces.bareMaterials))
             .convert();
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::failed, "the model needs more memory than there is");

@@ -238,8 +238,9 @@ void TextureSets::plan(const Part& part, const std::vector<std::uint32_t>& bound
         if (auto& sets = sets_[at]; sets.empty()) sets.push_back(number++);
 }
 
-/// The same without the prefix that the root's name has, if any.
-std::string withoutPrefix(std::string_view text) {
+/// The same without the prefix that the root's name has; nothing where it has none.
+std::optional<std::string> withoutPrefix(std::string_view text) {
+    if (text.find(":COLLADA") == std::string_view::npos) return std::nullopt;
     std::string prefix;
     std::string out;
     std::size_t copied = 0;
@@ -346,9 +347,8 @@ class Morphs {
 }  // namespace
 
 Result<PlainCollada> plainCollada(ByteSpan bytes) {
-    const std::string plain =
-        withoutPrefix({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-    const std::string_view text = plain;
+    const auto plain = withoutPrefix(textOf(bytes));
+    const std::string_view text = plain ? std::string_view(*plain) : textOf(bytes);
     PlainCollada out;
     EffectColours colours;
     Morphs morphs;

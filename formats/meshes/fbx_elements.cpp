@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstring>
-#include <optional>
 #include <vector>
+
+#include "formats/meshes/fbx_records.hpp"
+#include "formats/meshes/text_encoding.hpp"
 
 namespace stx {
 namespace {
@@ -94,59 +95,25 @@ class TextElements {
     std::vector<FbxValue> values_;
 };
 
-/// Records as those of FbxRecords (scene_claims.cpp), which has looked at their nesting before.
+/// Of a file of which scene_claims has looked at the nesting.
 class BinaryElements {
   public:
-    BinaryElements(ByteSpan bytes, const FbxVisit& visit) : bytes_(bytes), visit_(visit) {
-        field_ = number<std::uint32_t>(23).value_or(0) >= 7500 ? 8 : 4;
-    }
+    BinaryElements(ByteSpan bytes, const FbxVisit& visit) : bytes_(bytes), visit_(visit) {}
 
     void read() {
-        std::vector<std::uint64_t> ends = {bytes_.size()};
-        std::uint64_t at = 27;
-        while (!ends.empty()) {
-            const auto end = at < ends.back() ? field(at) : std::nullopt;
-            if (!end || *end == 0) {
-                at = ends.back();
-                ends.pop_back();
-                if (!inside_.empty()) inside_.pop_back();
-                continue;
-            }
-            const auto count = field(at + field_), length = field(at + 2 * field_);
-            const auto nameLength = number<std::uint8_t>(at + 3 * field_);
-            if (!count || !length || !nameLength || *end <= at || *end > bytes_.size()) return;
-            const auto properties = at + 3 * field_ + 1 + *nameLength;
-            if (properties > *end || *length > *end - properties) return;
-            const auto name = text(properties - *nameLength, *nameLength);
-            readValues(properties, *count, *end);
-            visit_({name, values_, inside_});
-            at = properties + *length;
-            if (at >= *end) continue;
-            if (ends.size() == kMostNesting) return;
-            ends.push_back(*end);
-            inside_.push_back(name);
-        }
+        (void)eachFbxRecord(bytes_, [this](const FbxRecord& record) -> Result<void> {
+            inside_.resize(record.depth);
+            readValues(record.properties, record.count, record.end);
+            visit_({record.name, values_, inside_});
+            if (record.opens) inside_.push_back(record.name);
+            return {};
+        });
     }
 
   private:
     template <class T>
-    [[nodiscard]] std::optional<T> number(std::uint64_t at) const {
-        if (at > bytes_.size() || sizeof(T) > bytes_.size() - at) return std::nullopt;
-        T value{};
-        std::memcpy(&value, bytes_.data() + at, sizeof(T));
-        return value;
-    }
-    [[nodiscard]] std::optional<std::uint64_t> field(std::uint64_t at) const {
-        if (field_ == 8) return number<std::uint64_t>(at);
-        return number<std::uint32_t>(at);
-    }
-    [[nodiscard]] std::string_view text(std::uint64_t at, std::uint64_t size) const {
-        return {reinterpret_cast<const char*>(bytes_.data()) + at, size};
-    }
-
-    template <class T>
     void addNumber(std::uint64_t& at) {
-        const T value = number<T>(at).value_or(T{});
+        const T value = numberAt<T>(bytes_, at).value_or(T{});
         at += sizeof(T);
         if constexpr (std::is_integral_v<T>)
             values_.push_back({{}, static_cast<std::int64_t>(value), static_cast<double>(value)});
@@ -171,10 +138,10 @@ class BinaryElements {
             } else if (type == 'D') {
                 addNumber<double>(at);
             } else if (type == 'S' || type == 'R') {
-                const auto size = number<std::uint32_t>(at);
+                const auto size = numberAt<std::uint32_t>(bytes_, at);
                 at += 4;
                 if (!size || at > end || *size > end - at) return;
-                values_.push_back({text(at, *size), 0, 0});
+                values_.push_back({textOf(bytes_).substr(at, *size), 0, 0});
                 at += *size;
             } else {
                 return;
@@ -184,7 +151,6 @@ class BinaryElements {
 
     ByteSpan bytes_;
     const FbxVisit& visit_;
-    std::uint64_t field_ = 4;  ///< bytes of a number: 8 from version 7.5 on
     std::vector<std::string_view> inside_;
     std::vector<FbxValue> values_;
 };
@@ -192,7 +158,7 @@ class BinaryElements {
 }  // namespace
 
 void eachFbxElement(ByteSpan bytes, const FbxVisit& visit) {
-    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const std::string_view text = textOf(bytes);
     if (text.starts_with("Kaydara FBX Binary"))
         BinaryElements(bytes, visit).read();
     else

@@ -15,27 +15,30 @@ namespace stx {
 namespace {
 
 /// Takes the next line off a text, joined where it goes on behind a backslash, without its comment.
-std::string joinedLine(std::string_view& text) {
-    std::string out;
+/// `joined` keeps it where it is not as in the text.
+std::string_view joinedLine(std::string_view& text, std::string& joined) {
+    joined.clear();
+    std::string_view line;
     for (bool goesOn = true; goesOn && !text.empty();) {
         const auto end = text.find('\n');
-        auto line = trimmed(text.substr(0, end));
+        line = trimmed(text.substr(0, end));
         text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
         goesOn = line.ends_with('\\');
-        if (goesOn) line.remove_suffix(1);
-        out.append(line);
-        if (goesOn) out += ' ';
+        if (!goesOn && joined.empty()) break;
+        joined += goesOn ? line.substr(0, line.size() - 1) : line;
+        joined += ' ';
+        line = joined;
     }
-    return out.substr(0, out.find('#'));
+    return line.substr(0, line.find('#'));
 }
 
 /// Calls visit(keyword, what is behind it, the line as it is) for each line until it gives false.
 template <class Visit>
 bool eachLine(std::string_view text, const Visit& visit) {
+    std::string joined;
     while (!text.empty()) {
         const auto before = text;
-        const std::string line = joinedLine(text);
-        std::string_view rest = line;
+        std::string_view rest = joinedLine(text, joined);
         const auto key = takeWord(rest);
         if (!visit(key, rest, before.substr(0, before.size() - text.size()))) return false;
     }
@@ -181,47 +184,53 @@ class Smoother {
 
 }  // namespace
 
-std::optional<Bytes> withSmoothNormals(ByteSpan bytes) {
-    const auto text = textOf(bytes);
-    Groups groups;
-    bool smooth = false;
-    const bool without = eachLine(text, [&](auto key, auto values, std::string_view) {
-        smooth = smooth || (key == "s" && groups.numberOf(trimmed(values)) != kFlat);
-        return key != "vn";
-    });
-    Smoother smoother;
-    if (!without || !smooth || !smoother.sum(text)) return std::nullopt;
-    const std::string out = smoother.write(text);
-    const auto written = std::as_bytes(std::span(out));
-    return Bytes(written.begin(), written.end());
-}
-
-std::set<std::string> materialsOfBareFaces(ByteSpan bytes) {
+ObjFaces objFaces(ByteSpan text) {
     struct Kinds {
         bool bare = false, withUvs = false;
     };
-    std::map<std::string, Kinds> kinds;  // of the faces of each material in an object
-    std::set<std::string> out;
+    ObjFaces out;
+    bool hasNormals = false, hasGroups = false;
+    Groups groups;
+    std::map<std::string, Kinds, std::less<>> kinds;  // of the faces of each material in an object
+    const auto kindsOf = [&](std::string_view material) {
+        return &kinds.emplace(material, Kinds()).first->second;
+    };
     std::string material;
+    Kinds* current = kindsOf(material);
     const auto endObject = [&] {
         for (const auto& [name, found] : kinds)
-            if (found.bare && found.withUvs) out.insert(name);
+            if (found.bare && found.withUvs) out.bareMaterials.insert(name);
         kinds.clear();
+        current = kindsOf(material);
     };
-    eachLine(textOf(bytes), [&](auto key, auto values, std::string_view) {
+    eachLine(textOf(text), [&](auto key, auto values, std::string_view) {
         if (key == "o" || key == "g") endObject();
-        if (key == "usemtl") material = trimmed(values);
+        if (key == "vn") hasNormals = true;
+        if (key == "s") hasGroups = hasGroups || groups.numberOf(trimmed(values)) != kFlat;
+        if (key == "usemtl") {
+            material = trimmed(values);
+            current = kindsOf(material);
+        }
         if (key != "f") return true;
         const auto corner = takeWord(values);
         const auto slash = corner.find('/');
         const bool bare = slash == std::string_view::npos || slash + 1 == corner.size() ||
                           corner[slash + 1] == '/';
-        auto& found = kinds[material];
-        (bare ? found.bare : found.withUvs) = true;
+        (bare ? current->bare : current->withUvs) = true;
         return true;
     });
     endObject();
+    out.smoothWithoutNormals = hasGroups && !hasNormals;
     return out;
+}
+
+std::optional<Bytes> withSmoothNormals(ByteSpan bytes) {
+    const auto text = textOf(bytes);
+    Smoother smoother;
+    if (!smoother.sum(text)) return std::nullopt;
+    const std::string out = smoother.write(text);
+    const auto written = std::as_bytes(std::span(out));
+    return Bytes(written.begin(), written.end());
 }
 
 }  // namespace stx

@@ -1,12 +1,12 @@
 #include "formats/meshes/scene_claims.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "formats/meshes/fbx_records.hpp"
 #include "formats/meshes/stl_colours.hpp"
 
 namespace stx {
@@ -17,50 +17,21 @@ Result<void> tooDeep(const Limits& limits) {
                 "the file's elements are nested deeper than {}; no model is", limits.maxNesting);
 }
 
-/// A binary FBX file: after a header of 27 bytes, records of (end, properties, bytes of them,
-/// name), the records inside of one between its properties and its end.
-class FbxRecords {
+/// What the records of a binary FBX file claim.
+class FbxClaims {
   public:
-    FbxRecords(ByteSpan bytes, const Limits& limits) : bytes_(bytes), limits_(limits) {
-        const auto version = number(23, 4);
-        wide_ = version && *version >= 7500;
-    }
+    FbxClaims(ByteSpan bytes, const Limits& limits) : bytes_(bytes), limits_(limits) {}
 
     Result<void> check() {
-        std::vector<std::uint64_t> ends = {bytes_.size()};
-        std::uint64_t at = 27;
-        const std::uint64_t field = wide_ ? 8 : 4, header = 3 * field + 1;
-        while (!ends.empty()) {
-            const auto end = at < ends.back() ? number(at, field) : std::nullopt;
-            if (!end || *end == 0) {  // the list of records ends here
-                at = ends.back();
-                ends.pop_back();
-                continue;
-            }
-            const auto count = number(at + field, field), length = number(at + 2 * field, field);
-            const auto name = number(at + 3 * field, 1);
-            if (!count || !length || !name || *end <= at || *end > bytes_.size()) return {};
-            const auto properties = at + header + *name;
-            STX_CHECK(checkArrays(properties, *count, *end));
-            if (*length > bytes_.size() || properties + *length >= *end) {
-                at = *end;
-                continue;
-            }
-            ends.push_back(*end);
-            if (ends.size() > static_cast<std::size_t>(limits_.maxNesting)) return tooDeep(limits_);
-            at = properties + *length;
-        }
-        return {};
+        return eachFbxRecord(bytes_, [this](const FbxRecord& record) -> Result<void> {
+            STX_CHECK(checkArrays(record.properties, record.count, record.end));
+            if (record.opens && record.depth + 2 > static_cast<std::size_t>(limits_.maxNesting))
+                return tooDeep(limits_);
+            return {};
+        });
     }
 
   private:
-    [[nodiscard]] std::optional<std::uint64_t> number(std::uint64_t at, std::uint64_t size) const {
-        if (at > bytes_.size() || size > bytes_.size() - at) return std::nullopt;
-        std::uint64_t value = 0;
-        std::memcpy(&value, bytes_.data() + at, size);
-        return value;
-    }
-
     /// Adds up what the arrays among the properties of a record take.
     Result<void> checkArrays(std::uint64_t at, std::uint64_t count, std::uint64_t end) {
         for (std::uint64_t i = 0; i < count && at < end; ++i) {
@@ -71,19 +42,19 @@ class FbxRecords {
                 at += kSizes[k];
                 continue;
             }
-            const auto length = number(at, 4);
+            const auto length = numberAt<std::uint32_t>(bytes_, at);
             if (!length) return {};
             if (type == 'S' || type == 'R') {
                 at += 4 + *length;
                 continue;
             }
-            const auto packed = number(at + 8, 4);
+            const auto packed = numberAt<std::uint32_t>(bytes_, at + 8);
             if (!packed || std::string_view("fdlibc").find(type) == std::string_view::npos)
                 return {};
             const std::uint64_t each = type == 'd' || type == 'l'   ? 8
                                        : type == 'b' || type == 'c' ? 1
                                                                     : 4;
-            claimed_ += *length * each;
+            claimed_ += std::uint64_t{*length} * each;
             STX_CHECK(limits_.checkAllocation(claimed_, 2, "the arrays of the FBX file"));
             at += 12 + *packed;
         }
@@ -92,7 +63,6 @@ class FbxRecords {
 
     ByteSpan bytes_;
     const Limits& limits_;
-    bool wide_ = false;  ///< numbers of 64 bits, from version 7.5 on
     std::uint64_t claimed_ = 0;
 };
 
@@ -124,7 +94,7 @@ Result<void> checkColladaClaims(ByteSpan bytes, const Limits& limits) {
 
 Result<void> checkFbxClaims(ByteSpan bytes, const Limits& limits) {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    if (text.starts_with("Kaydara FBX Binary")) return FbxRecords(bytes, limits).check();
+    if (text.starts_with("Kaydara FBX Binary")) return FbxClaims(bytes, limits).check();
     int depth = 0;
     for (const char c : text) {
         if (c == '{' && ++depth > limits.maxNesting) return tooDeep(limits);

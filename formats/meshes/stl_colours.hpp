@@ -17,7 +17,7 @@ namespace stx {
 [[nodiscard]] std::uint64_t bytesBehindBinaryStl(ByteSpan bytes);
 
 /// A text STL whose keywords are in upper case with these in lower case, as Assimp wants them;
-/// nothing when they are, or when it is no text.
+/// nothing when they are, or when it is not a text.
 [[nodiscard]] std::optional<Bytes> lowerCaseStl(ByteSpan bytes);
 
 /// The colours of the corners of a binary STL in sRGB, as the two bytes behind each facet say

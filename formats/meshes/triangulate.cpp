@@ -79,7 +79,7 @@ class CornerGrid {
 
   private:
     [[nodiscard]] glm::ivec2 place(glm::dvec2 p) const {
-        // In this order what is no number is in the last square.
+        // In this order what is not a number is in the last square.
         return glm::ivec2(glm::min(glm::dvec2(side_ - 1), (p - low_) / size_));
     }
     std::vector<std::uint32_t>& squareOf(glm::dvec2 p) {

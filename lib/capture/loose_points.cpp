@@ -192,7 +192,7 @@ Mesh withoutPoints(const Mesh& mesh) {
     return out;
 }
 
-/// Adds some points of `mesh`, shape.triangles() each but where there is no axisOf().
+/// Adds some points of `mesh`, shape.triangles() for each that has an axisOf().
 void addPoints(const Mesh& mesh, std::span<const std::uint32_t> points, const Camera& camera,
                const Shape& shape, Mesh& out) {
     const auto material = static_cast<std::uint32_t>(out.materials.size());

@@ -200,39 +200,31 @@ TEST(FbxScene, HiddenObjectsAndLowerLevelsAreLeftOut) {
 }
 
 TEST(FbxScene, PicturesInsideAreTheirTexturesOwn) {
+    // Two triangles with a material, a texture and a picture inside each.
+    const auto read = [](const std::string& second, const std::string& videos,
+                         const std::vector<Connection>& ofVideos) {
+        std::vector<Connection> all = {{20, 0},
+                                       {21, 0},
+                                       {10, 20},
+                                       {11, 21},
+                                       {30, 20},
+                                       {31, 21},
+                                       {40, 30, "DiffuseColor"},
+                                       {41, 31, "DiffuseColor"}};
+        all.insert(all.end(), ofVideos.begin(), ofVideos.end());
+        return readFbx(geometryOf(10) + geometryOf(11) + modelOf(20, "a") + modelOf(21, "b") +
+                           objectOf("Material", 30, "m", "") + objectOf("Material", 31, "n", "") +
+                           textureOf(40, "C:/head/t.png") + textureOf(41, second) + videos,
+                       all);
+    };
+    const std::string head = videoOf(50, "C:/head/t.png", kRed);
     const auto model =
-        readFbx(geometryOf(10) + geometryOf(11) + modelOf(20, "a") + modelOf(21, "b") +
-                    objectOf("Material", 30, "m", "") + objectOf("Material", 31, "n", "") +
-                    textureOf(40, "C:/head/t.png") + textureOf(41, "C:/body/t.png") +
-                    videoOf(50, "C:/head/t.png", kRed) + videoOf(51, "C:/body/t.png", kBlue),
-                {{20, 0},
-                 {21, 0},
-                 {10, 20},
-                 {11, 21},
-                 {30, 20},
-                 {31, 21},
-                 {40, 30, "DiffuseColor"},
-                 {41, 31, "DiffuseColor"},
-                 {50, 40},
-                 {51, 41}});
+        read("C:/body/t.png", head + videoOf(51, "C:/body/t.png", kBlue), {{50, 40}, {51, 41}});
     ASSERT_EQ(model.mesh.textures.size(), 2u);
     EXPECT_EQ(model.mesh.textures[0].pixels.at(0, 0), glm::u8vec4(255, 0, 0, 255));
     EXPECT_EQ(model.mesh.textures[1].pixels.at(0, 0), glm::u8vec4(0, 0, 255, 255));
     // A file of the same name outside stays one.
-    const auto outside =
-        readFbx(geometryOf(10) + geometryOf(11) + modelOf(20, "a") + modelOf(21, "b") +
-                    objectOf("Material", 30, "m", "") + objectOf("Material", 31, "n", "") +
-                    textureOf(40, "C:/head/t.png") + textureOf(41, "body/t.png") +
-                    videoOf(50, "C:/head/t.png", kRed),
-                {{20, 0},
-                 {21, 0},
-                 {10, 20},
-                 {11, 21},
-                 {30, 20},
-                 {31, 21},
-                 {40, 30, "DiffuseColor"},
-                 {41, 31, "DiffuseColor"},
-                 {50, 40}});
+    const auto outside = read("body/t.png", head, {{50, 40}});
     EXPECT_EQ(outside.mesh.textures.size(), 1u);
     EXPECT_TRUE(outside.hasNote("texture 'body/t.png'"));
 }
