@@ -92,10 +92,17 @@ Result<void> writeGrey(const Image<std::uint8_t>& image, const std::string& path
 Result<void> writeColour(const Rgba8Image& image, const std::string& path, Program& program) {
     Frame frame;
     frame.colour = Image<glm::vec4>(image.width(), image.height());
-    for (std::size_t i = 0; i < image.count(); ++i)
+    std::size_t open = 0;
+    for (std::size_t i = 0; i < image.count(); ++i) {
         frame.colour.pixels()[i] = glm::vec4(image.pixels()[i]) / 255.0f;
+        open += image.pixels()[i].a == 0;
+    }
     FrameOptions options;
-    options.background = glm::vec3(0);  // there is no alpha
+    if (open == 0)
+        options.background = glm::vec3(0);  // written without alpha
+    else
+        program.job.note(
+            fmt::format("{} stay open: no frame shows anything there", counted(open, "pixel")));
     options.pngLevel = 6;
     options.noClobber = program.common.noClobber;
     return writeFrame(frame, path, options);

@@ -26,15 +26,17 @@ struct StillSettings {
     int quietest = 19;  ///< frames that are kept of each pixel, 1..255
     /// The side of the window that motion is summed over: the picture's shorter side over this.
     int windowDivisor = 6;
-    /// Frames with at most this many times the quietest ones' mean motion are kept, too: where
-    /// nothing happens the median is one of all frames. Below 1: none.
+    /// Frames with at most this many times the quietest ones' mean motion, or that of the film's
+    /// middle pixel, are kept, too: where nothing happens the median is one of all frames, and an
+    /// even thing that passes is not chosen for having less noise than what it hides. Below 1: few
+    /// or none.
     double adaptive = 1.15;
     /// Motion is the change of gradients instead of luma: slow changes of light are none.
     bool drift = false;
 };
 
 struct StillBackground {
-    Rgba8Image colour;  ///< opaque
+    Rgba8Image colour;  ///< opaque; 0 where no frame shows anything
     /// How far the frames that a pixel is made of agree with it, 0..255. select and median: the
     /// share of them within kStillAgrees levels in the worst channel; n2pg: the share of all frames
     /// that the pixel has been steady for since it was last replaced.
@@ -48,8 +50,9 @@ inline constexpr int kStillAgrees = 20;
 /// The background of the frames. The same result on any number of threads. Memory is bounded by
 /// job.limits, whatever the number of frames: select and median work on bands of rows and read the
 /// frames again for each when they cannot be kept (n2pg: once, with 24 bytes a pixel beside the
-/// reader's frames). Errors: usage (settings out of range), invalidInput (fewer than 2 frames),
-/// those of reading a frame, failed (memory, cancelled).
+/// reader's frames). Pixels of a frame that are transparent (isSeen()) do not count. Errors: usage
+/// (settings out of range; n2pg: transparent pixels), invalidInput (fewer than 2 frames), those of
+/// reading a frame, failed (memory, cancelled).
 [[nodiscard]] Result<StillBackground> stillBackground(StillFrames& frames,
                                                       const StillSettings& settings, Job& job);
 

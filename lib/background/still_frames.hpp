@@ -21,7 +21,7 @@ class StillFrames {
     /// Width and height of every frame, pixels, at least 1.
     [[nodiscard]] virtual glm::ivec2 size() const = 0;
     [[nodiscard]] virtual int count() const = 0;
-    /// Frame `k`, from 0; alpha means nothing. Any frame, as often as wanted, from several threads
+    /// Frame `k`, from 0, with straight alpha. Any frame, as often as wanted, from several threads
     /// at a time. Errors are those of reading it, and (invalidInput) another size.
     [[nodiscard]] virtual Result<std::shared_ptr<const Rgba8Image>> frame(int k) = 0;
 };
@@ -56,6 +56,11 @@ inline constexpr std::uint64_t kFrameBytesPerPixel = 8;
 [[nodiscard]] Result<void> takeFrames(
     StillFrames& frames, std::span<const int> which, std::uint64_t bytes,
     const std::function<void(std::size_t, const Rgba8Image&)>& take);
+
+/// Whether a pixel shows more of what was filmed than it hides. What was cut out is not looked at.
+[[nodiscard]] inline bool isSeen(glm::u8vec4 p) {
+    return p.a >= 128;
+}
 
 /// Luma of BT.601, 0..255: what every method here sees of a frame.
 [[nodiscard]] inline std::uint8_t stillLuma(glm::u8vec4 p) {

@@ -16,7 +16,7 @@ constexpr int kNoNoise = 50;
 /// A piece of foreground, or a hole in it, of fewer pixels than the picture's over this is noise.
 constexpr std::size_t kSpeckShare = 5000;
 
-/// The largest difference of R, G and B.
+/// The largest difference of R, G and B, or all of it where one shows nothing.
 Image<std::uint8_t> channelDifference(const Rgba8Image& a, const Rgba8Image& b) {
     Image<std::uint8_t> out(a.width(), a.height());
     parallelFor(0, a.height(), [&](int y) {
@@ -25,6 +25,7 @@ Image<std::uint8_t> channelDifference(const Rgba8Image& a, const Rgba8Image& b) 
         for (std::size_t x = 0; x < to.size(); ++x) {
             int most = 0;
             for (int c = 0; c < 3; ++c) most = std::max(most, std::abs(p[x][c] - q[x][c]));
+            if (!isSeen(p[x]) || !isSeen(q[x])) most = isSeen(p[x]) == isSeen(q[x]) ? 0 : 255;
             to[x] = static_cast<std::uint8_t>(most);
         }
     });

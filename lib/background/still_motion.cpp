@@ -12,8 +12,12 @@ void LumaRows::take(const Rgba8Image& picture, int firstRow, int rowCount) {
     first = firstRow;
     rows = rowCount;
     values.resize(static_cast<std::size_t>(rows) * width);
+    seen.resize(values.size());
     const glm::u8vec4* from = picture.data() + static_cast<std::size_t>(first) * width;
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = stillLuma(from[i]);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i] = stillLuma(from[i]);
+        seen[i] = isSeen(from[i]);
+    }
 }
 
 MotionWindow::MotionWindow(int width, int height, int divisor, MotionScore score)
@@ -31,25 +35,38 @@ int MotionWindow::rowsNeeded(int first, int rows) const {
     return std::min(height_, first + rows + radius_ + 1) - firstNeeded(first);
 }
 
+int MotionWindow::pixels(int x, int y) const {
+    const auto side = [this](int at, int size) {
+        return std::min(at + radius_, size - 1) - std::max(at - radius_, 0) + 1;
+    };
+    return side(x, width_) * side(y, height_);
+}
+
 void MotionWindow::scores(const LumaRows& before, const LumaRows& now, int y,
                           std::uint16_t* to) const {
     const std::uint8_t* a = before.row(y);
     const std::uint8_t* b = now.row(y);
+    const int last = width_ - 1;
     if (score_ == MotionScore::luma) {
         for (int x = 0; x < width_; ++x) to[x] = static_cast<std::uint16_t>(std::abs(b[x] - a[x]));
-        return;
+    } else {
+        const bool below = y + 1 < height_;
+        const std::uint8_t* aBelow = below ? before.row(y + 1) : a;
+        const std::uint8_t* bBelow = below ? now.row(y + 1) : b;
+        for (int x = 0; x < last; ++x) {
+            const int here = b[x] - a[x];
+            to[x] = static_cast<std::uint16_t>(std::abs(b[x + 1] - a[x + 1] - here) +
+                                               std::abs(bBelow[x] - aBelow[x] - here));
+        }
+        to[last] =
+            static_cast<std::uint16_t>(std::abs(bBelow[last] - aBelow[last] - b[last] + a[last]));
     }
-    const bool below = y + 1 < height_;
-    const std::uint8_t* aBelow = below ? before.row(y + 1) : a;
-    const std::uint8_t* bBelow = below ? now.row(y + 1) : b;
-    const int last = width_ - 1;
-    for (int x = 0; x < last; ++x) {
-        const int here = b[x] - a[x];
-        to[x] = static_cast<std::uint16_t>(std::abs(b[x + 1] - a[x + 1] - here) +
-                                           std::abs(bBelow[x] - aBelow[x] - here));
+    const std::uint8_t* aSeen = before.seenRow(y);
+    const std::uint8_t* bSeen = now.seenRow(y);
+    for (int x = 0; x < width_; ++x) {
+        const int alike = aSeen[x] & bSeen[x], differ = aSeen[x] ^ bSeen[x];
+        to[x] = static_cast<std::uint16_t>(to[x] * alike + kMostScore * differ);
     }
-    to[last] =
-        static_cast<std::uint16_t>(std::abs(bBelow[last] - aBelow[last] - b[last] + a[last]));
 }
 
 void MotionWindow::quantities(const LumaRows& before, const LumaRows& now, int first, int rows,

@@ -258,6 +258,11 @@ Result<StillBackground> n2pgBackground(StillFrames& frames, std::span<const int>
     for (std::size_t i = 0; i < which.size(); ++i) {
         STX_CHECK(job.checkCancelled());
         STX_TRY(const auto frame, frames.frame(which[i]));
+        if (!std::all_of(frame->pixels().begin(), frame->pixels().end(), isSeen))
+            return fail(ErrorCode::usage,
+                        "frame {} has transparent pixels, which the method n2pg cannot leave out; "
+                        "take --method select or median",
+                        which[i]);
         if (i == 0)
             model.begin(*frame);
         else

@@ -14,12 +14,19 @@ constexpr std::size_t kFramesAtOnce = 16;
 /// Pixels of a piece of a parallel loop.
 constexpr std::int64_t kPixelsAtOnce = 2048;
 
+/// The share of pixels whose quietest frames have at most the film's noise; the rest is edges that
+/// tremble. tests/bench/backgrounds_and_panoramas.md has what others give.
+constexpr double kNoiseShare = 0.75;
+/// Of a pixel with fewer frames than are kept.
+constexpr auto kNone = std::numeric_limits<std::uint32_t>::max();
+
 /// How often each value of one pixel occurred.
 struct ValueCounts {
     std::uint16_t counts[3][256];
     std::uint16_t frames;
 
     void add(glm::u8vec4 p) {
+        if (!isSeen(p)) return;
         ++counts[0][p.r];
         ++counts[1][p.g];
         ++counts[2][p.b];
@@ -64,12 +71,29 @@ class BandSelector {
           window_(frames.size().x, frames.size().y, settings.windowDivisor,
                   settings.drift ? MotionScore::gradient : MotionScore::luma) {}
 
+    /// Of a band of rows, the largest motion that a frame may have to be kept.
+    [[nodiscard]] Result<void> find(int first, int rows) {
+        begin(first, rows);
+        return findQuietest();
+    }
+
+    /// After the last find(): where the quietest frames move less than the film's noise, all
+    /// frames that do are kept.
+    void keepNoise() {
+        auto means = quietestMeans_;
+        const auto noise =
+            means.begin() + static_cast<std::ptrdiff_t>(kNoiseShare * (means.size() - 1));
+        std::nth_element(means.begin(), noise, means.end());
+        const int width = frames_.size().x;
+        parallelFor(0, largest_.size(), kPixelsAtOnce, [&](std::size_t p) {
+            const int x = static_cast<int>(p) % width, y = static_cast<int>(p) / width;
+            keep(p, double{*noise} * window_.pixels(x, y));
+        });
+    }
+
+    /// The background of a band of rows.
     [[nodiscard]] Result<void> make(int first, int rows, StillBackground& to) {
-        first_ = first;
-        rows_ = rows;
-        pixels_ = static_cast<std::size_t>(rows) * frames_.size().x;
-        largest_.clear();
-        if (settings_.method == StillMethod::select) STX_CHECK(findQuietest());
+        begin(first, rows);
         values_.assign(pixels_, ValueCounts{});
         STX_CHECK(forBlocks([&](std::size_t n) { count(n); }));
         write(to);
@@ -116,10 +140,18 @@ class BandSelector {
         return {};
     }
 
-    /// The largest motion that a frame may have to be kept, of each pixel.
+    void begin(int first, int rows) {
+        first_ = first;
+        rows_ = rows;
+        pixels_ = static_cast<std::size_t>(rows) * frames_.size().x;
+        offset_ = static_cast<std::size_t>(first) * frames_.size().x;
+    }
+
     Result<void> findQuietest() {
         const auto kept = std::min(static_cast<std::size_t>(settings_.quietest), which_.size());
-        constexpr auto kNone = std::numeric_limits<std::uint32_t>::max();
+        const auto all = static_cast<std::size_t>(frames_.size().x) * frames_.size().y;
+        largest_.resize(all);
+        quietestMeans_.resize(all);
         quietest_.assign(pixels_ * kept, kNone);
         STX_CHECK(forBlocks([&](std::size_t n) {
             forPixels([&](std::size_t p) {
@@ -127,44 +159,52 @@ class BandSelector {
                 for (std::size_t i = 0; i < n; ++i) {
                     const std::uint32_t motion = block_[i].motion[p];
                     std::uint32_t* at = first + kept - 1;
-                    if (motion >= *at) continue;
+                    if (motion >= *at || !isSeen(block_[i].colour[p])) continue;
                     for (; at > first && at[-1] > motion; --at) *at = at[-1];
                     *at = motion;
                 }
             });
         }));
-        largest_.resize(pixels_);
         forPixels([&](std::size_t p) {
             const std::uint32_t* const first = &quietest_[p * kept];
-            double sum = 0;
-            for (std::size_t i = 0; i < kept; ++i) sum += first[i];
-            const double limit = settings_.adaptive * sum / static_cast<double>(kept);
-            largest_[p] = std::max(first[kept - 1],
-                                   static_cast<std::uint32_t>(std::min(limit, double{kNone})));
+            double sum = 0, n = 0;
+            for (std::size_t i = 0; i < kept && first[i] != kNone; ++i, ++n) sum += first[i];
+            const double mean = n > 0 ? sum / n : 0;
+            const int x = static_cast<int>(p) % frames_.size().x;
+            const int y = first_ + static_cast<int>(p) / frames_.size().x;
+            quietestMeans_[offset_ + p] = static_cast<float>(mean / window_.pixels(x, y));
+            largest_[offset_ + p] = first[kept - 1];
+            keep(offset_ + p, mean);
         });
         return {};
+    }
+
+    /// Keeps the frames of a pixel whose motion is not beyond the adaptive share of `motion`.
+    void keep(std::size_t p, double motion) {
+        const double limit = std::min(settings_.adaptive * motion, double{kNone});
+        largest_[p] = std::max(largest_[p], static_cast<std::uint32_t>(limit));
     }
 
     void count(std::size_t n) {
         forPixels([&](std::size_t p) {
             for (std::size_t i = 0; i < n; ++i)
-                if (largest_.empty() || block_[i].motion[p] <= largest_[p])
+                if (largest_.empty() || block_[i].motion[p] <= largest_[offset_ + p])
                     values_[p].add(block_[i].colour[p]);
         });
     }
 
     void write(StillBackground& to) const {
-        const auto offset = static_cast<std::size_t>(first_) * frames_.size().x;
         forPixels([&](std::size_t p) {
             const ValueCounts& v = values_[p];
+            if (v.frames == 0) return;
             glm::u8vec4 colour(0, 0, 0, 255);
             int near = v.frames;
             for (int c = 0; c < 3; ++c) {
                 colour[c] = v.median(c);
                 near = std::min(near, v.near(c, colour[c]));
             }
-            to.colour.pixels()[offset + p] = colour;
-            to.confidence.pixels()[offset + p] =
+            to.colour.pixels()[offset_ + p] = colour;
+            to.confidence.pixels()[offset_ + p] =
                 static_cast<std::uint8_t>((255 * near + v.frames / 2) / v.frames);
         });
     }
@@ -180,10 +220,12 @@ class BandSelector {
     Job& job_;
     MotionWindow window_;
     int first_ = 0, rows_ = 0;
-    std::size_t pixels_ = 0;
+    std::size_t pixels_ = 0, offset_ = 0;  ///< of the band; of its first in the picture
     std::vector<BandFrame> block_;
-    std::vector<std::uint32_t> quietest_;  ///< motion of the quietest frames, rising
-    std::vector<std::uint32_t> largest_;   ///< empty: every frame is kept
+    std::vector<std::uint32_t> quietest_;  ///< motion of the band's quietest frames, rising
+    // Of the whole picture:
+    std::vector<std::uint32_t> largest_;  ///< empty: every frame is kept
+    std::vector<float> quietestMeans_;    ///< mean score of a pixel of a window
     std::vector<ValueCounts> values_;
 };
 
@@ -219,12 +261,20 @@ Result<StillBackground> selectBackground(StillFrames& frames, std::span<const in
     out.framesUsed = static_cast<int>(which.size());
     BandSelector selector(kept, which, settings, job);
     selector.allSteps = static_cast<std::int64_t>(which.size()) * passes;
-    for (int band = 0; band < bands; ++band) {
-        // Of equal height, but for one row.
-        const int first = static_cast<int>(std::int64_t{size.y} * band / bands);
-        const int end = static_cast<int>(std::int64_t{size.y} * (band + 1) / bands);
-        STX_CHECK(selector.make(first, end - first, out));
+    const auto forBands = [&](const auto& body) -> Result<void> {
+        for (int band = 0; band < bands; ++band) {
+            // Of equal height, but for one row.
+            const int first = static_cast<int>(std::int64_t{size.y} * band / bands);
+            const int end = static_cast<int>(std::int64_t{size.y} * (band + 1) / bands);
+            STX_CHECK(body(first, end - first));
+        }
+        return {};
+    };
+    if (settings.method == StillMethod::select) {
+        STX_CHECK(forBands([&](int first, int count) { return selector.find(first, count); }));
+        selector.keepNoise();
     }
+    STX_CHECK(forBands([&](int first, int count) { return selector.make(first, count, out); }));
     return out;
 }
 

@@ -76,6 +76,55 @@ TEST(StillBackground, SelectSeesBehindWhatCoversAPlaceMostOfTheTime) {
     EXPECT_LT(errors(StillMethod::select).peps, 0.002);
 }
 
+/// An even box that is too bright for the camera, and so without the noise of the wall, walks
+/// through the picture: any pixel shows it in a sixth of the frames.
+TEST(StillBackground, SelectDoesNotTakeWhatHasLessNoiseForWhatStandsStill) {
+    DrawnFrames frames(kStillSize, 120, [](int k) {
+        auto picture = wallWithBox(kStillSize, k, {-100, 0, 1, 1});
+        for (int y = 20; y < 44; ++y)
+            for (int x = std::max(0, k * 2 - 70); x < std::min(kStillSize.x, k * 2 - 30); ++x)
+                picture.at(x, y) = glm::u8vec4(255);
+        return picture;
+    });
+    Job job;
+    StillSettings settings;
+    const auto right = mustMakeStill(stillBackground(frames, settings, job));
+    EXPECT_LT(backgroundErrors(right.colour, wall(kStillSize)).peps, 0.001);
+    settings.adaptive = 0;
+    const auto wrong = mustMakeStill(stillBackground(frames, settings, job));
+    EXPECT_GT(backgroundErrors(wrong.colour, wall(kStillSize)).peps, 0.05) << "no longer hard";
+}
+
+/// What was cut out of the frames has a colour that nobody sees.
+TEST(StillBackground, TransparentPixelsAreNotLookedAt) {
+    const auto cutOut = [](int always) {
+        return DrawnFrames(kStillSize, 12, [always](int k) {
+            auto picture = wallWithBox(kStillSize, k, {-100, 0, 1, 1});
+            for (int y = 20; y < 40; ++y)
+                for (int x = 10; x < 50; ++x)
+                    if (k % 3 || x < always) picture.at(x, y) = glm::u8vec4(255, 0, 255, 0);
+            return picture;
+        });
+    };
+    Job job;
+    for (const auto method : {StillMethod::select, StillMethod::median}) {
+        auto frames = cutOut(0);
+        const auto made = mustMakeStill(stillBackground(frames, methodOf(method), job));
+        EXPECT_LT(backgroundErrors(made.colour, wall(kStillSize)).peps, 0.001);
+        for (const auto p : made.colour.pixels()) ASSERT_EQ(p.a, 255);
+
+        auto open = cutOut(30);
+        const auto part = mustMakeStill(stillBackground(open, methodOf(method), job));
+        EXPECT_EQ(part.colour.at(15, 30), glm::u8vec4(0));
+        EXPECT_EQ(part.confidence.at(15, 30), 0);
+        EXPECT_EQ(part.colour.at(35, 30).a, 255);
+    }
+    auto frames = cutOut(0);
+    const auto made = stillBackground(frames, methodOf(StillMethod::n2pg), job);
+    ASSERT_FALSE(made);
+    EXPECT_EQ(made.error().code, ErrorCode::usage);
+}
+
 TEST(StillBackground, MedianOfAnEvenNumberIsTheMeanOfTheTwoInTheMiddle) {
     const int levels[] = {200, 10, 13, 0};  // sorted: 0 10 13 200
     DrawnFrames frames({2, 2}, 4, [&](int k) {
