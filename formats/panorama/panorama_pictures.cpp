@@ -60,6 +60,7 @@ class PictureFiles final : public PictureSource {
             return failAt(inQuotes(files_[at].string()), ErrorCode::invalidInput,
                           "it is {}x{}; a picture of a panorama has at least {} pixels a side",
                           upright.width(), upright.height(), kLeastSide);
+        upright = shownOrNot(std::move(upright));
         const std::lock_guard lock(mutex_);
         const std::uint64_t size = upright.count() * sizeof(glm::u8vec4);
         if (kept_[at].empty() && size <= room_) {

@@ -17,6 +17,8 @@ constexpr double kLeastInside = 1e-4;
 /// A picture fills cells that are farther from its edge than this, in cells or as a share of its
 /// shorter side's half.
 constexpr double kFilledCells = 1.5, kFilledShare = 0.3;
+/// The pixels whose light is mixed at a position are within this of it.
+constexpr double kShownPixels = 0.5;
 /// The smallest copy of a picture that its cells are taken from, pixels of its longer side.
 constexpr int kLeastCopy = 8;
 /// A picture that sees a pole, or nearly so, radians, has cells all around.
@@ -42,6 +44,16 @@ glm::vec3 linearAt(const Image<glm::vec3>& image, glm::dvec2 pixel) {
     const auto tx = static_cast<float>(px - x0), ty = static_cast<float>(py - y0);
     return glm::mix(glm::mix(image.at(x0, y0), image.at(x1, y0), tx),
                     glm::mix(image.at(x0, y1), image.at(x1, y1), tx), ty);
+}
+
+/// Whether the picture shows all of the pixels within `reach` of a position.
+bool showsAround(const Rgba8Image& picture, glm::dvec2 pixel, double reach) {
+    const auto first = glm::max(glm::ivec2(glm::floor(pixel - reach)), glm::ivec2(0));
+    const auto last = glm::min(glm::ivec2(glm::floor(pixel + reach)), picture.size() - 1);
+    for (int y = first.y; y <= last.y; ++y)
+        for (int x = first.x; x <= last.x; ++x)
+            if (picture.at(x, y).a < 255) return false;
+    return true;
 }
 
 Footprint footprintOf(Rgba8Image picture, const PanoramaCamera& camera, const TurnLens& lens,
@@ -92,9 +104,10 @@ Footprint footprintOf(Rgba8Image picture, const PanoramaCamera& camera, const Tu
             const glm::dvec2 p = glm::abs(2.0 * pixel / row.size - 1.0) * extent;
             const glm::dvec2 inner = extent - p;
             const double border = std::min(inner.x, inner.y);
-            if (border <= 0) continue;
+            if (border <= 0 || !showsAround(copy.colour, pixel, kShownPixels)) continue;
             f.inside.at(x, y) = static_cast<float>(std::max(kLeastInside, border / shorter));
-            f.whole.at(x, y) = border * cells > kFilledCells || border > kFilledShare * shorter;
+            f.whole.at(x, y) = (border * cells > kFilledCells || border > kFilledShare * shorter) &&
+                               showsAround(copy.colour, pixel, kFilledCells);
             f.radius2.at(x, y) = static_cast<float>(glm::dot(p, p));
             f.colour.at(x, y) = linearAt(light, pixel);
         }

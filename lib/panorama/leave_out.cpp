@@ -41,11 +41,11 @@ LeftOutPicture compared(const WorkCopy& copy, const PanoramaCamera& camera, cons
             glm::vec4& c = seen.at(x, y);
             const glm::dvec2 p = copy.position({x + 0.5, y + 0.5});
             c = mosaic.sample(worldFromCamera * lens.ray(p));
-            if (c.a < kCovered) {
+            const glm::u8vec4 own = copy.colour.at(x, y);
+            if (c.a < kCovered || own.a < 255) {
                 c.a = 0;
                 continue;
             }
-            const glm::u8vec4 own = copy.colour.at(x, y);
             const glm::dvec3 truth(tables.linear(own.r), tables.linear(own.g),
                                    tables.linear(own.b));
             c = {linearByTable(c.r), linearByTable(c.g), linearByTable(c.b), 1};

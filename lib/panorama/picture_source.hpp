@@ -13,8 +13,8 @@ class PictureSource {
   public:
     virtual ~PictureSource() = default;
     [[nodiscard]] virtual int count() const = 0;
-    /// Picture `k`, upright, 8-bit sRGB; alpha means nothing. As often as wanted, from several
-    /// threads at a time. Errors are those of reading it.
+    /// Picture `k`, upright, 8-bit sRGB. Alpha is 255, or 0 where it shows nothing (shownOrNot()).
+    /// As often as wanted, from several threads at a time. Errors are those of reading it.
     [[nodiscard]] virtual Result<Rgba8Image> picture(int k) = 0;
     /// What to call picture k in messages: the name of its file.
     [[nodiscard]] virtual std::string name(int k) const = 0;
@@ -22,5 +22,9 @@ class PictureSource {
     /// not known.
     [[nodiscard]] virtual double focalHint(int k) const = 0;
 };
+
+/// The picture with alpha 255 where it shows more than it hides, else 0 and the colours of what is
+/// shown beside (bleedColour()), which filters may reach.
+[[nodiscard]] Rgba8Image shownOrNot(Rgba8Image picture);
 
 }  // namespace stx

@@ -45,6 +45,10 @@ constexpr int kMoverMargin = 2;
 /// How often each picture may take cells from the others.
 constexpr int kRounds = 2;
 
+glm::vec3 codedOf(glm::vec3 light) {
+    return 255.0f * glm::vec3(srgbByTable(light.r), srgbByTable(light.g), srgbByTable(light.b));
+}
+
 /// Something that one picture shows and others do not.
 struct Mover {
     std::size_t picture = 0;
@@ -66,12 +70,15 @@ class SeamGrid {
             coded_[k] = Image<glm::vec3>(f.box.width, f.box.height, glm::vec3(0));
             cost_[k] = Image<float>(f.box.width, f.box.height, 0.0f);
             for (std::size_t p = 0; p < coded_[k].count(); ++p) {
-                const glm::vec3 c =
-                    withGain(cleared(f.colour.pixels()[p], f.clearingAt(p)), glm::vec3(gains[k]));
-                coded_[k].pixels()[p] =
-                    255.0f * glm::vec3(srgbByTable(c.r), srgbByTable(c.g), srgbByTable(c.b));
+                const glm::vec3 light = cleared(f.colour.pixels()[p], f.clearingAt(p));
+                const glm::vec3 gain(gains[k]);
+                const glm::vec3 shown = codedOf(withGain(light, gain));
+                coded_[k].pixels()[p] = shown;
                 const float out = 1 - std::min(1.0f, f.inside.pixels()[p]);
-                cost_[k].pixels()[p] = kEdge * out * out;
+                // Beside the edge, what the gain would have changed and the clipped light does not
+                // let it.
+                const glm::vec3 held = shown - codedOf(light * gain);
+                cost_[k].pixels()[p] = kEdge * out * out + std::max({held.r, held.g, held.b});
                 const glm::vec3 raw = f.colour.pixels()[p];
                 if (std::max({raw.r, raw.g, raw.b}) > kClippedLight)
                     cost_[k].pixels()[p] += kClipped;

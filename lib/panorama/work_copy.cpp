@@ -18,25 +18,24 @@ Rgba8Image reduced(const Rgba8Image& picture, int width, int height) {
     const double sx = static_cast<double>(picture.width()) / width;
     const double sy = static_cast<double>(picture.height()) / height;
     parallelForBlocks(0, height, 16, [&](std::int64_t begin, std::int64_t end) {
-        std::vector<glm::vec3> sums(static_cast<std::size_t>(picture.width()));
+        std::vector<glm::vec4> sums(static_cast<std::size_t>(picture.width()));
         for (auto y = static_cast<int>(begin); y < end; ++y) {
-            std::fill(sums.begin(), sums.end(), glm::vec3(0));
+            std::fill(sums.begin(), sums.end(), glm::vec4(0));
             const double top = y * sy, bottom = (y + 1) * sy;
             const int last = std::min(picture.height(), static_cast<int>(std::ceil(bottom)));
             for (int row = static_cast<int>(top); row < last; ++row) {
                 const float w = share(top, bottom, row);
                 const auto from = picture.row(row);
-                for (std::size_t x = 0; x < sums.size(); ++x)
-                    sums[x] += w * glm::vec3(from[x].r, from[x].g, from[x].b);
+                for (std::size_t x = 0; x < sums.size(); ++x) sums[x] += w * glm::vec4(from[x]);
             }
             for (int x = 0; x < width; ++x) {
                 const double left = x * sx, right = (x + 1) * sx;
                 const int end2 = std::min(picture.width(), static_cast<int>(std::ceil(right)));
-                glm::vec3 sum(0);
+                glm::vec4 sum(0);
                 for (int column = static_cast<int>(left); column < end2; ++column)
                     sum += share(left, right, column) * sums[column];
-                out.at(x, y) = glm::u8vec4(
-                    glm::clamp(sum / static_cast<float>(sx * sy) + 0.5f, 0.0f, 255.0f), 255);
+                out.at(x, y) =
+                    glm::u8vec4(glm::clamp(sum / static_cast<float>(sx * sy) + 0.5f, 0.0f, 255.0f));
             }
         }
     });

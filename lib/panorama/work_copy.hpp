@@ -38,7 +38,7 @@ struct WorkCopy {
 };
 
 /// The copy, whose longer side is at most `maxSide` pixels. The mean of the area that a pixel
-/// covers.
+/// covers, of alpha, too.
 [[nodiscard]] WorkCopy makeWorkCopy(Rgba8Image picture, int maxSide);
 
 /// A picture of width / 2 x height / 2, rounded down but at least 1, smoothed by 1 3 3 1.

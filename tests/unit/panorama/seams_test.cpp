@@ -111,6 +111,65 @@ double psnrAfterGain(const PanoramaImage& made, const PanoramaImage& sphere) {
     return 10 * std::log10(255 * 255 * 3 * static_cast<double>(both.size()) / squares);
 }
 
+/// Pictures of which parts were cut out: the upper eighth of each, and of one all below its middle.
+class CutOut final : public PictureSource {
+  public:
+    CutOut(TurningCamera& camera, int half) : camera_(camera), half_(half) {}
+    [[nodiscard]] int count() const override { return camera_.count(); }
+    [[nodiscard]] std::string name(int k) const override { return camera_.name(k); }
+    [[nodiscard]] double focalHint(int) const override { return 0; }
+    [[nodiscard]] Result<Rgba8Image> picture(int k) override {
+        STX_TRY(auto picture, camera_.picture(k));
+        for (int y = 0; y < picture.height(); ++y)
+            if (y < picture.height() / 8 || (k == half_ && y >= picture.height() / 2))
+                for (glm::u8vec4& p : picture.row(y)) p = glm::u8vec4(255, 0, 255, 0);
+        return shownOrNot(std::move(picture));
+    }
+
+  private:
+    TurningCamera& camera_;
+    int half_;
+};
+
+TEST(ComposePanorama, TransparentPixelsShowNothing) {
+    const PanoramaImage sphere{texturedSphere(1024)};
+    TurningCamera camera;
+    camera.sphere = &sphere;
+    for (int k = 0; k < 3; ++k) camera.add(0.25 * k, 0, 0);
+    PanoramaAlignment known = alignmentOf(camera);
+    CutOut source(camera, 1);
+    Job job;
+    for (const int width : {512, 2048}) {
+        const auto made = composePanorama(source, known, {.width = width}, job);
+        ASSERT_TRUE(made) << made.error().text();
+        EXPECT_GT(psnrAfterGain(*made, sphere), 30);
+        // Straight below the middle's middle the others see; above no picture shows anything.
+        const auto alphaAt = [&](double yaw, double pitch) {
+            const glm::dvec3 ahead = glm::angleAxis(yaw, glm::dvec3(0, 1, 0)) *
+                                     glm::angleAxis(pitch, glm::dvec3(1, 0, 0)) *
+                                     glm::dvec3(0, 0, -1);
+            const glm::dvec2 at = PanoramaImage::position(ahead, width);
+            return int{made->pixels.at(static_cast<int>(at.x), static_cast<int>(at.y)).a};
+        };
+        EXPECT_EQ(alphaAt(0.25, -0.2), 255);
+        EXPECT_EQ(alphaAt(0.25, 0.2), 255);
+        EXPECT_EQ(alphaAt(0.25, 0.33), 0);
+    }
+}
+
+TEST(ComposePanorama, WhatIsTooBrightIsShownByThePictureThatHasIt) {
+    const PanoramaImage sphere{texturedSphere(1024)};
+    TurningCamera camera;
+    camera.sphere = &sphere;
+    camera.gains = {1, 2.5f, 1};
+    for (int k = 0; k < 3; ++k) camera.add(0.25 * k, 0, 0);
+    PanoramaAlignment known = alignmentOf(camera);
+    Job job;
+    const auto made = composePanorama(camera, known, {.width = 1024}, job);
+    ASSERT_TRUE(made) << made.error().text();
+    EXPECT_GT(psnrAfterGain(*made, sphere), 31.5);
+}
+
 TurningCamera discsInARow(const PanoramaImage& sphere) {
     TurningCamera camera;
     camera.sphere = &sphere;

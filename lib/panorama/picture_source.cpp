@@ -1,0 +1,17 @@
+#include "lib/panorama/picture_source.hpp"
+
+#include <algorithm>
+
+namespace stx {
+
+Rgba8Image shownOrNot(Rgba8Image picture) {
+    const auto pixels = picture.pixels();
+    if (std::all_of(pixels.begin(), pixels.end(), [](glm::u8vec4 p) { return p.a == 255; }))
+        return picture;
+    for (glm::u8vec4& p : pixels) p.a = p.a < 128 ? 0 : 255;
+    Texture texture(std::move(picture));
+    bleedColour(texture);
+    return std::move(*texture.rgba8());
+}
+
+}  // namespace stx
