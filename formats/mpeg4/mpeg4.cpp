@@ -165,7 +165,9 @@ Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job) {
             where, ErrorCode::invalidInput,
             "the file is neither an MP4 nor a BT or XMT-A text (endings .mp4, .bt, .xmt)");
     if (*container == Mpeg4Container::mp4) {
-        return within(where, readMp4(source, job));
+        STX_TRY(auto film, within(where, readMp4(source, job)));
+        film.folder = folderOf(path);
+        return film;
     }
     if (path != "-") STX_SET(whole, readFile(path, job.limits));
     auto document = *container == Mpeg4Container::bt ? readBt(textOf(whole), path.string(), job)
@@ -178,6 +180,7 @@ Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job) {
         folders.push_back(folderOf(real));
     }
     STX_CHECK(within(where, loadMedia(*document, folders, job)));
+    document->folder = folders.front();
     return document;
 }
 
@@ -196,6 +199,7 @@ Result<void> writeMpeg4(const Mpeg4Document& document, const std::filesystem::pa
         same.bifsVersion = 0;
         return writeMpeg4(other, path, job, same);
     }
+    noteFilesOfUrls(document, folderOf(path), job);
     if (*container != Mpeg4Container::mp4)
         return writeText(document, path, *container, job, options.output);
     STX_TRY(auto file, OutputFile::create(path, options.output));
