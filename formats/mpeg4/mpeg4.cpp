@@ -6,6 +6,7 @@
 
 #include "formats/files/files.hpp"
 #include "formats/files/no_case.hpp"
+#include "formats/files/text_encoding.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
 #include "formats/mpeg4/mapping/picture_spool.hpp"
 #include "formats/mpeg4/media_files.hpp"
@@ -20,10 +21,6 @@ namespace stx {
 using namespace mpeg4;
 
 namespace {
-
-std::string_view textOf(ByteSpan bytes) {
-    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
 
 /// Files in a folder that an earlier text's images left there, by the names that we give.
 std::vector<std::string> earlierImages(const std::filesystem::path& folder) {
@@ -135,8 +132,9 @@ std::optional<Mpeg4Container> mpeg4ContainerOf(const std::filesystem::path& path
 
 std::optional<Mpeg4Container> mpeg4ContainerOf(ByteSpan head) {
     if (looksLikeMp4(head)) return Mpeg4Container::mp4;
-    const std::string_view text = textOf(head);
-    const auto first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
+    const auto marked = utf8FromMarked(head);
+    const std::string_view text = textOf(marked ? ByteSpan(*marked) : head);
+    const auto first = text.find_first_not_of(" \t\r\n");
     if (first != std::string_view::npos && text[first] == '<' &&
         text.find("<XMT-A") != std::string_view::npos)
         return Mpeg4Container::xmt;
