@@ -18,7 +18,7 @@
 #include "formats/files/messages.hpp"
 #include "formats/files/pipes.hpp"
 #include "formats/files/temporaries.hpp"
-#include "formats/meshes/text_encoding.hpp"
+#include "formats/files/text_encoding.hpp"
 #include "lib/base/parallel.hpp"
 #include "tools/stop_signals.hpp"
 

@@ -1,10 +1,12 @@
 #include "tools/command_line.hpp"
 
 #include <algorithm>
+#include <span>
 #include <sstream>
 
 #include <CLI/CLI.hpp>
 
+#include "lib/model/same_pictures.hpp"
 #include "tools/build_text.hpp"
 #include "tools/help_text.hpp"
 #include "tools/output_names.hpp"
@@ -14,6 +16,7 @@
 namespace stx::tools {
 namespace {
 
+constexpr const char* kSharedOptions = "Shared options";
 constexpr const char* kHelp = "Print this help and stop";
 
 /// What CLI11 says of a validator, "{png,jpeg}".
@@ -277,7 +280,7 @@ Option Command::flag(const std::string& names, int& count, const std::string& he
 }
 
 void Command::sharedOptions(CommonOptions& to, unsigned which) {
-    Command c = under("Shared options");
+    Command c = under(kSharedOptions);
     c.option("--threads", to.threads, "Threads to use; 0 = all processors").range(0, 1024);
     CLI::Option* memory =
         app_->add_option("--max-memory", to.maxMemoryMiB,
@@ -321,6 +324,19 @@ std::vector<std::string> Command::given(const std::vector<std::string>& names) c
     return found;
 }
 
+std::string Command::jobOf(const std::vector<std::string>& without) const {
+    std::string all;
+    for (const auto* option : std::as_const(*app_).get_options()) {
+        const auto names = optionRow(*option).names;
+        if (option->count() == 0 || option->get_group() == kSharedOptions ||
+            std::ranges::find_first_of(names, without) != names.end())
+            continue;
+        // A zero ends a word, as none can hold it.
+        all += names.front() + '\0';
+        for (const std::string& value : option->results()) all += value + '\0';
+    }
+    return fmt::format("{:016x}", hashOf(std::as_bytes(std::span(all))));
+}
 std::vector<std::string> Command::givenUnder(const std::string& heading) const {
     std::vector<std::string> found;
     for (const auto* option : std::as_const(*app_).get_options())

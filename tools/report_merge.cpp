@@ -39,6 +39,15 @@ Result<void> MergedReport::expect(Kind kind, std::size_t total) {
     return {};
 }
 
+Result<void> MergedReport::expectJob(const Json& shard) {
+    const std::string job = shard.value("job", "");
+    if (job_.empty()) job_ = job;
+    if (job.empty() || job == job_) return {};
+    return fail(ErrorCode::invalidInput,
+                "it is of other inputs or options than the reports before it; all must be of one "
+                "list or path");
+}
+
 Result<void> MergedReport::addEntry(Json entry, std::size_t total) {
     STX_TRY(const auto index, wholeOf(entry, "index"));
     if (index >= total)
@@ -74,6 +83,7 @@ Result<void> MergedReport::addPictures(Json report) {
                     "it is not of a shard; only reports of runs with --shard can be joined");
     STX_TRY(const auto total, wholeOf(*shard, "total"));
     STX_CHECK(expect(Kind::pictures, total));
+    STX_CHECK(expectJob(*shard));
     auto views = std::move(report["views"]);
     if (!views.is_array()) return fail(ErrorCode::invalidInput, "'views' is not a list");
     for (auto& view : views) {
@@ -126,6 +136,7 @@ Result<void> MergedReport::add(std::string_view text) {
             auto total = wholeOf(*shard, "total");
             if (!total) return propagate(total);
             auto added = expect(Kind::inputs, *total);
+            if (added) added = expectJob(*shard);
             if (added) added = addEntry(std::move(entry), *total);
             if (!added) return tl::unexpected(added.error().at(fmt::format("line {}", number)));
         }

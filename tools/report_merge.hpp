@@ -18,7 +18,7 @@ namespace stx::tools {
 class MergedReport {
   public:
     /// Adds the text of one report. Errors (invalidInput): neither of the two, no shard's, another
-    /// kind, length or input than those before.
+    /// kind, length, job or input than those before.
     [[nodiscard]] Result<void> add(std::string_view text);
 
     /// Inputs or pictures of all shards together; 0 until a report has told it.
@@ -60,9 +60,12 @@ class MergedReport {
     [[nodiscard]] Result<void> addEntry(nlohmann::ordered_json entry, std::size_t total);
     [[nodiscard]] Result<void> addPictures(nlohmann::ordered_json report);
     [[nodiscard]] Result<void> expect(Kind kind, std::size_t total);
+    /// Errors when a report's shard tells of another job than those before it.
+    [[nodiscard]] Result<void> expectJob(const nlohmann::ordered_json& shard);
 
     Kind kind_ = Kind::none;
     std::size_t total_ = 0;
+    std::string job_;  ///< of the shards; reports of earlier versions do not tell it
     std::map<std::size_t, Entry> entries_;
     nlohmann::ordered_json head_;  ///< of pictures: the report without them
     std::vector<std::string> failedRuns_;

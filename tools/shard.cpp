@@ -20,7 +20,9 @@ Result<void> parseShard(const std::string& text, Shard& shard) {
         return fail(ErrorCode::usage,
                     "it is '{}'; K/N with 1 <= K <= N <= {} is expected, as in 3/8", text,
                     kMostShards);
-    shard = {number, count, true};
+    shard.number = number;
+    shard.count = count;
+    shard.given = true;
     return {};
 }
 
@@ -34,7 +36,13 @@ Shard::Range Shard::rangeOf(std::size_t length) const {
 
 void addShardOption(Command c, Shard& shard, const char* what) {
     c.option(
-         "--shard", [&shard](const std::string& text) { return parseShard(text, shard); },
+         "--shard",
+         [&shard, c](const std::string& text) {
+             // But for what is of a run's machine, and of how it goes on where another stopped.
+             shard.job = c.jobOf({"--shard", "--skip-existing", "--keep-going", "--jobs",
+                                  "--backend", "--device", "--pipeline", "--explain"});
+             return parseShard(text, shard);
+         },
          fmt::format("Only part K of N of the {}, from 1: for N runs that do all of it without "
                      "speaking to each other; 'stx report merge' joins their reports",
                      what))
@@ -42,7 +50,7 @@ void addShardOption(Command c, Shard& shard, const char* what) {
 }
 
 nlohmann::ordered_json shardJson(const Shard& shard, std::size_t total) {
-    return {{"number", shard.number}, {"count", shard.count}, {"total", total}};
+    return {{"number", shard.number}, {"count", shard.count}, {"total", total}, {"job", shard.job}};
 }
 
 }  // namespace stx::tools

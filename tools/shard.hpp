@@ -14,6 +14,7 @@ namespace stx::tools {
 /// together they are the whole, and none has anything of another.
 struct Shard {
     std::int64_t number = 1, count = 1;  ///< K and N, 1 <= K <= N
+    std::string job;  ///< the same for all runs of one command line, see Command::jobOf()
     bool given = false;
 
     /// Of lists: each N-th, since neighbours in a list are often alike and cost the same.
@@ -30,7 +31,7 @@ struct Shard {
 /// Adds --shard K/N. `what`: "inputs".
 void addShardOption(Command command, Shard& shard, const char* what);
 
-/// {"number": K, "count": N, "total": length}, for reports.
+/// {"number": K, "count": N, "total": length, "job": job}, for reports.
 [[nodiscard]] nlohmann::ordered_json shardJson(const Shard& shard, std::size_t total);
 
 }  // namespace stx::tools

@@ -29,6 +29,8 @@ class ByteSource {
     [[nodiscard]] ByteSpan view() const;
     /// Name for error messages; empty for memory.
     [[nodiscard]] const std::string& name() const;
+    /// Whether both are copies of one: two openings of a file are not.
+    bool operator==(const ByteSource&) const = default;
 
     struct Impl;
 
@@ -50,6 +52,7 @@ struct ByteRange {
 
     /// Reads them. Errors as ByteSource::read, and when they are more than limits allow.
     [[nodiscard]] Result<Bytes> load(const Limits& limits) const;
+    bool operator==(const ByteRange&) const = default;
 };
 
 }  // namespace stx

@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "formats/files/text_encoding.hpp"
 #include "formats/meshes/collada_tags.hpp"
-#include "formats/meshes/text_encoding.hpp"
 
 namespace stx {
 

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "formats/meshes/text_encoding.hpp"
+#include "formats/files/text_encoding.hpp"
 
 namespace stx::collada {
 

@@ -13,9 +13,9 @@
 #include <fmt/format.h>
 #include <glm/glm.hpp>
 
+#include "formats/files/text_encoding.hpp"
 #include "formats/meshes/collada_joints.hpp"
 #include "formats/meshes/collada_tags.hpp"
-#include "formats/meshes/text_encoding.hpp"
 
 namespace stx {
 

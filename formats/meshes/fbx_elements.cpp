@@ -4,8 +4,8 @@
 #include <charconv>
 #include <vector>
 
+#include "formats/files/text_encoding.hpp"
 #include "formats/meshes/fbx_records.hpp"
-#include "formats/meshes/text_encoding.hpp"
 
 namespace stx {
 namespace {

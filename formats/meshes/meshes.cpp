@@ -4,10 +4,10 @@
 #include <set>
 
 #include "formats/files/deflate.hpp"
+#include "formats/files/text_encoding.hpp"
 #include "formats/images/images.hpp"
 #include "formats/images/more_pictures.hpp"
 #include "formats/meshes/readers.hpp"
-#include "formats/meshes/text_encoding.hpp"
 #include "formats/meshes/vertex_colours.hpp"
 
 namespace stx {

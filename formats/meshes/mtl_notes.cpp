@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "formats/files/no_case.hpp"
-#include "formats/meshes/text_encoding.hpp"
+#include "formats/files/text_encoding.hpp"
 #include "lib/base/whole_number.hpp"
 
 namespace stx {

@@ -8,7 +8,7 @@
 
 #include <glm/glm.hpp>
 
-#include "formats/meshes/text_encoding.hpp"
+#include "formats/files/text_encoding.hpp"
 #include "lib/base/whole_number.hpp"
 
 namespace stx {

@@ -4,9 +4,9 @@
 #include <optional>
 #include <string_view>
 
+#include "formats/files/text_encoding.hpp"
 #include "formats/meshes/mesh_builder.hpp"
 #include "formats/meshes/readers.hpp"
-#include "formats/meshes/text_encoding.hpp"
 #include "formats/meshes/triangulate.hpp"
 #include "formats/meshes/vertex_colours.hpp"
 #include "lib/base/counted.hpp"

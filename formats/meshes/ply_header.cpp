@@ -3,7 +3,7 @@
 #include <optional>
 #include <string_view>
 
-#include "formats/meshes/text_encoding.hpp"
+#include "formats/files/text_encoding.hpp"
 #include "lib/base/whole_number.hpp"
 
 namespace stx {

@@ -1,7 +1,7 @@
 #include "formats/meshes/side_files.hpp"
 
+#include "formats/files/text_encoding.hpp"
 #include "formats/meshes/model_wire.hpp"
-#include "formats/meshes/text_encoding.hpp"
 
 namespace stx {
 namespace {

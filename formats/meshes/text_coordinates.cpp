@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "formats/meshes/text_encoding.hpp"
+#include "formats/files/text_encoding.hpp"
 #include "lib/geometry/origin.hpp"
 #include "lib/model/strays.hpp"
 

@@ -11,6 +11,7 @@
 #include "formats/mpeg4/text/text_descriptors.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 #include "lib/base/code_point.hpp"
+#include "lib/base/counted.hpp"
 #include "lib/geometry/directions.hpp"
 
 namespace stx::mpeg4 {
@@ -234,7 +235,72 @@ class MediaLoader {
     std::uint64_t total_ = 0;
 };
 
+/// The urls of a scene that are texts.
+class UrlTexts {
+  public:
+    explicit UrlTexts(const Document& document) {
+        const auto visit = [&](const NodePtr& node) {
+            for (const Node::SetField& field : node->setFields) add(field.value);
+        };
+        forEachNode(document.frames, visit);
+        for (const CommandFrame& frame : document.frames)
+            for (const Command& command : frame.commands)
+                std::visit(
+                    [&](const auto& c) {
+                        if constexpr (requires { c.value; }) add(c.value);
+                        if constexpr (requires { c.protos; }) addProtos(c.protos);
+                    },
+                    command);
+    }
+    std::set<std::string> found;
+
+  private:
+    void add(const FieldValue& value) {
+        if (const auto* one = std::get_if<Url>(&value)) found.insert(one->text);
+        if (const auto* several = std::get_if<std::vector<Url>>(&value))
+            for (const Url& one : *several) found.insert(one.text);
+    }
+    void addProtos(const std::vector<ProtoPtr>& protos) {
+        for (const ProtoPtr& proto : protos) {
+            add(proto->urls);
+            if (proto->type.defaults)
+                for (const FieldValue& value : proto->type.defaults->values) addAll(value);
+            addAll(proto->body);
+            addProtos(proto->protos);
+        }
+    }
+    void addAll(const FieldValue& value) {
+        add(value);
+        const auto visit = [&](const NodePtr& node) {
+            for (const Node::SetField& field : node->setFields) add(field.value);
+        };
+        if (const auto* node = std::get_if<NodePtr>(&value)) forEachNode(*node, visit);
+        if (const auto* list = std::get_if<NodeList>(&value))
+            for (const NodePtr& node : *list) forEachNode(node, visit);
+    }
+};
+
 }  // namespace
+
+void noteFilesOfUrls(const Document& document, const std::filesystem::path& to, Job& job) {
+    if (document.folder.empty()) return;
+    std::vector<std::string> lost;
+    for (const std::string& name : UrlTexts(document).found) {
+        const auto file = resolveInside(document.folder, name, job.limits);
+        if (!file) continue;
+        std::error_code error;
+        if (std::filesystem::equivalent(*file, to / name, error)) continue;
+        const auto before = readFile(*file, job.limits), there = readFile(to / name, job.limits);
+        if (!before || !there || *before != *there) lost.push_back(name);
+    }
+    if (lost.empty()) return;
+    job.note(fmt::format(
+        "urls of the scene name {}, not taken along ('{}'{}); copy {} into '{}', or give the "
+        "textures object descriptors",
+        counted(lost.size(), "file"), excerpt(lost.front()),
+        lost.size() > 1 ? fmt::format(" and {} more", lost.size() - 1) : "",
+        lost.size() > 1 ? "them" : "it", to.string()));
+}
 
 bool needsTrackFile(const ElementaryStream& stream) {
     if (stream.samples.empty()) return false;

@@ -21,6 +21,11 @@ namespace stx::mpeg4 {
 [[nodiscard]] Result<void> loadMedia(Document& document,
                                      const std::vector<std::filesystem::path>& folders, Job& job);
 
+/// Notes the files in document.folder that urls of the scene name, PROTOs included, and that are
+/// not in `to` likewise: a url is written as it is, and finds nothing there. Those of object
+/// descriptors are none of them.
+void noteFilesOfUrls(const Document& document, const std::filesystem::path& to, Job& job);
+
 /// In a scene that was made from a bundle, says what the tracks of its images are for: each gets a
 /// name, and only colour is in the movie, so that players that know no scenes have no reason to
 /// show depth as a video. Other scenes stay as they are.

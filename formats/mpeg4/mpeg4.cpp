@@ -6,6 +6,7 @@
 
 #include "formats/files/files.hpp"
 #include "formats/files/no_case.hpp"
+#include "formats/files/text_encoding.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
 #include "formats/mpeg4/mapping/picture_spool.hpp"
 #include "formats/mpeg4/media_files.hpp"
@@ -20,10 +21,6 @@ namespace stx {
 using namespace mpeg4;
 
 namespace {
-
-std::string_view textOf(ByteSpan bytes) {
-    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
 
 /// Files in a folder that an earlier text's images left there, by the names that we give.
 std::vector<std::string> earlierImages(const std::filesystem::path& folder) {
@@ -135,8 +132,9 @@ std::optional<Mpeg4Container> mpeg4ContainerOf(const std::filesystem::path& path
 
 std::optional<Mpeg4Container> mpeg4ContainerOf(ByteSpan head) {
     if (looksLikeMp4(head)) return Mpeg4Container::mp4;
-    const std::string_view text = textOf(head);
-    const auto first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
+    const auto marked = utf8FromMarked(head);
+    const std::string_view text = textOf(marked ? ByteSpan(*marked) : head);
+    const auto first = text.find_first_not_of(" \t\r\n");
     if (first != std::string_view::npos && text[first] == '<' &&
         text.find("<XMT-A") != std::string_view::npos)
         return Mpeg4Container::xmt;
@@ -165,7 +163,9 @@ Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job) {
             where, ErrorCode::invalidInput,
             "the file is neither an MP4 nor a BT or XMT-A text (endings .mp4, .bt, .xmt)");
     if (*container == Mpeg4Container::mp4) {
-        return within(where, readMp4(source, job));
+        STX_TRY(auto film, within(where, readMp4(source, job)));
+        film.folder = folderOf(path);
+        return film;
     }
     if (path != "-") STX_SET(whole, readFile(path, job.limits));
     auto document = *container == Mpeg4Container::bt ? readBt(textOf(whole), path.string(), job)
@@ -178,6 +178,7 @@ Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job) {
         folders.push_back(folderOf(real));
     }
     STX_CHECK(within(where, loadMedia(*document, folders, job)));
+    document->folder = folders.front();
     return document;
 }
 
@@ -196,6 +197,7 @@ Result<void> writeMpeg4(const Mpeg4Document& document, const std::filesystem::pa
         same.bifsVersion = 0;
         return writeMpeg4(other, path, job, same);
     }
+    noteFilesOfUrls(document, folderOf(path), job);
     if (*container != Mpeg4Container::mp4)
         return writeText(document, path, *container, job, options.output);
     STX_TRY(auto file, OutputFile::create(path, options.output));

@@ -195,7 +195,7 @@ void writeQuantised(BitWriter& out, const QuantisedCoding& coding, int component
     const double low = coding.minimum[component];
     const double range = coding.maximum[component] - low;
     const double share = range > 0 ? (static_cast<double>(value) - low) / range : 0;
-    const double inside = std::isnan(share) ? 0 : std::clamp(share, 0.0, 1.0);
+    const double inside = std::isnan(share) ? 0 : share;  // of infinite bounds
     out.write(static_cast<std::uint32_t>(std::round(inside * steps(coding.bits))), coding.bits);
 }
 

@@ -72,6 +72,7 @@ class QuantisationScope {
 };
 
 [[nodiscard]] float readQuantised(BitReader& in, const QuantisedCoding& coding, int component);
+/// `value` must be within the bounds.
 void writeQuantised(BitWriter& out, const QuantisedCoding& coding, int component, float value);
 
 /// Two or three numbers on the unit sphere (normals and rotations).

@@ -45,8 +45,7 @@ Result<void> BifsNodeWriter::write(std::int32_t value, const Coding& coding) {
     return out.write(static_cast<std::uint32_t>(above), coding->bits), Result<void>{};
 }
 Result<void> BifsNodeWriter::write(float value, const Coding& coding) {
-    writeComponent(coding, 0, value);
-    return {};
+    return writeComponent(coding, 0, value);
 }
 Result<void> BifsNodeWriter::write(double value, const Coding&) {
     return out.write64(std::bit_cast<std::uint64_t>(value)), Result<void>{};
@@ -63,14 +62,18 @@ Result<void> BifsNodeWriter::write(const Url& value, const Coding&) {
     out.write(static_cast<std::uint32_t>(value.objectDescriptorId), 10);
     return {};
 }
-void BifsNodeWriter::writeComponent(const Coding& coding, int component, float value) {
-    if (coding)
-        writeQuantised(out, *coding, component, value);
-    else
-        writeFloat(value);
+Result<void> BifsNodeWriter::writeComponent(const Coding& coding, int component, float value) {
+    if (!coding) return writeFloat(value), Result<void>{};
+    const double low = coding->minimum[component], high = coding->maximum[component];
+    if (!(value >= low && value <= high))
+        return error(
+            "the value {} is not within {} to {}, the bounds that it has while a "
+            "QuantizationParameter is active; widen the bounds of that node or remove it",
+            value, static_cast<float>(low), static_cast<float>(high));
+    return writeQuantised(out, *coding, component, value), Result<void>{};
 }
 Result<void> BifsNodeWriter::write(const glm::vec2& value, const Coding& coding) {
-    for (int i = 0; i < 2; ++i) writeComponent(coding, i, value[i]);
+    for (int i = 0; i < 2; ++i) STX_CHECK(writeComponent(coding, i, value[i]));
     return {};
 }
 Result<void> BifsNodeWriter::write(const glm::vec3& value, const Coding& coding) {
@@ -78,7 +81,7 @@ Result<void> BifsNodeWriter::write(const glm::vec3& value, const Coding& coding)
         writeQuantisedNormal(out, *coding, value);
         return {};
     }
-    for (int i = 0; i < 3; ++i) writeComponent(coding, i, value[i]);
+    for (int i = 0; i < 3; ++i) STX_CHECK(writeComponent(coding, i, value[i]));
     return {};
 }
 Result<void> BifsNodeWriter::write(const Color& value, const Coding& coding) {

@@ -53,7 +53,7 @@ struct BifsNodeWriter {
     using Coding = std::optional<QuantisedCoding>;
 
     void writeFloat(float value);
-    void writeComponent(const Coding& coding, int component, float value);
+    Result<void> writeComponent(const Coding& coding, int component, float value);
     Result<void> writeString(const std::string& text);
     Result<void> writeName(const std::string& text);
     Result<void> write(bool value, const Coding&);

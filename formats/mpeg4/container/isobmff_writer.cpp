@@ -9,6 +9,7 @@
 #include "formats/mpeg4/container/image_headers.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
 #include "formats/mpeg4/container/movie_boxes.hpp"
+#include "lib/model/same_pictures.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -102,7 +103,8 @@ class Writer {
             }
     }
 
-    /// Which track each stream of the descriptors becomes. Streams of one ES_ID are one track.
+    /// Which track each stream of the descriptors becomes. Streams of one ES_ID and the same
+    /// samples are one track; with other samples an ES_ID that comes again is another.
     Result<void> collectStreams() {
         for (const std::uint32_t id : {document_.sceneStream.esId, document_.odStream.esId})
             if (id != 0) takenIds_.insert(id);
@@ -116,20 +118,7 @@ class Writer {
 
         Result<void> done;
         eachStream([&](const ElementaryStream& stream, int odId) {
-            if (!done) return;
-            const bool shared = stream.esId != 0 && trackOfEs_.contains(stream.esId);
-            if (shared) {
-                trackOfStream_[&stream] = trackOfEs_.at(stream.esId);
-                return;
-            }
-            auto track = makeMediaTrack(stream, odId);
-            if (!track) {
-                done = tl::unexpected(track.error());
-                return;
-            }
-            trackOfStream_[&stream] = track->id;
-            if (stream.esId != 0) trackOfEs_[stream.esId] = track->id;
-            media_.push_back(std::move(*track));
+            if (done) done = collect(stream, odId);
         });
         // Files name the clock's track beside the descriptor, not in it.
         for (WrittenTrack& track : media_) {
@@ -142,10 +131,54 @@ class Writer {
         return done;
     }
 
+    Result<void> collect(const ElementaryStream& stream, int odId) {
+        STX_TRY(std::uint32_t track, earlierTrack(stream));
+        if (track == 0) {
+            STX_TRY(WrittenTrack made, makeMediaTrack(stream, odId));
+            track = made.id;
+            media_.push_back(std::move(made));
+        }
+        trackOfStream_[&stream] = track;
+        if (stream.esId == 0) return {};
+        trackOfEs_[stream.esId] = track;
+        // One without samples says nothing but that it is there.
+        if (!stream.samples.empty() || !stream.url.empty()) latestOfEs_[stream.esId] = &stream;
+        return {};
+    }
+
+    /// The track that a stream has already; 0 for none.
+    Result<std::uint32_t> earlierTrack(const ElementaryStream& stream) {
+        const auto found = latestOfEs_.find(stream.esId);
+        if (found == latestOfEs_.end()) return 0u;
+        const ElementaryStream& latest = *found->second;
+        const bool same = latest.url == stream.url && latest.timescale == stream.timescale &&
+                          latest.samples == stream.samples && latest.edits == stream.edits;
+        if (same || (stream.samples.empty() && stream.url.empty()))
+            return trackOfStream_.at(&latest);
+        STX_TRY(auto key, keyOf(latest));
+        trackOfKey_[std::move(key)] = trackOfStream_.at(&latest);
+        STX_TRY(const auto own, keyOf(stream));
+        const auto known = trackOfKey_.find(own);
+        return known == trackOfKey_.end() ? 0u : known->second;
+    }
+    /// Equal for streams with one ES_ID, url, samples and edits. Reads the samples.
+    Result<std::string> keyOf(const ElementaryStream& stream) const {
+        std::string key = fmt::format("{} {} {}", stream.esId, stream.url, stream.timescale);
+        for (const Sample& sample : stream.samples) {
+            STX_TRY(const Bytes bytes, sample.data.load(job_.limits));
+            key += fmt::format(" {} {} {}", sample.time, bytes.size(), hashOf(bytes));
+        }
+        for (const Edit& edit : stream.edits.edits)
+            key += fmt::format(" {} {} {} {}", edit.duration, edit.mediaTime, edit.rate,
+                               stream.edits.timescale);
+        return key;
+    }
+
     Result<WrittenTrack> makeMediaTrack(const ElementaryStream& stream, int odId) {
         const std::string what = fmt::format("the stream of object descriptor {}", odId);
         WrittenTrack track;
-        const bool clashes = stream.esId == sceneId_ || stream.esId == odId_;
+        const bool clashes =
+            stream.esId == sceneId_ || stream.esId == odId_ || trackOfEs_.contains(stream.esId);
         track.id = stream.esId == 0 || clashes ? freeId() : stream.esId;
         track.stream = stream;
         ElementaryStream& out = track.stream;
@@ -304,11 +337,14 @@ class Writer {
     }
 
     /// The commands with their streams reduced to the tracks they became.
-    std::vector<OdCommand> withTrackIds(const std::vector<OdCommand>& commands) const {
+    std::vector<OdCommand> withTrackIds(const std::vector<OdCommand>& commands) {
         const auto reduce = [&](const std::vector<ElementaryStream>& streams) {
             std::vector<ElementaryStream> reduced;
-            for (const ElementaryStream& stream : streams)
+            for (const ElementaryStream& stream : streams) {
                 reduced.emplace_back().esId = trackOfStream_.at(&stream);
+                // What a later removal means by the ES_ID.
+                if (stream.esId != 0) trackOfEs_[stream.esId] = reduced.back().esId;
+            }
             return reduced;
         };
         std::vector<OdCommand> result;
@@ -391,6 +427,8 @@ class Writer {
     std::uint32_t odId_ = 0;
     std::unordered_map<const ElementaryStream*, std::uint32_t> trackOfStream_;
     std::unordered_map<std::uint32_t, std::uint32_t> trackOfEs_;
+    std::unordered_map<std::uint32_t, const ElementaryStream*> latestOfEs_;  ///< of each ES_ID
+    std::unordered_map<std::string, std::uint32_t> trackOfKey_;  ///< of those that were replaced
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <variant>
@@ -73,6 +74,7 @@ struct Sample {
     std::uint32_t duration = 1000;  ///< one second at the usual timescale
     std::int32_t compositionOffset = 0;
     bool sync = true;
+    bool operator==(const Sample&) const = default;
 };
 
 /// One edit of an edit list (ISO/IEC 14496-12, 8.6.6).
@@ -237,6 +239,9 @@ struct Document {
 
     /// How the file looked, when it was an .mp4.
     std::optional<Mp4Facts> mp4;
+    /// The folder of the file that it was read from, where its urls that are names are looked for;
+    /// empty for none.
+    std::filesystem::path folder;
 
     /// All object descriptors as they are after the frames with time <= `until` (ticks of the OD
     /// stream): updates replace, removals remove. In order of their ids. Pointers into this

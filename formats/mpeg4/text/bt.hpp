@@ -14,10 +14,10 @@ namespace stx::mpeg4 {
 /// are taken in any case of letters. Times are ticks of the stream (milliseconds unless its
 /// SLConfigDescriptor has another timeStampResolution). The DEF name N12 is node id 13.
 /// Streams get their file names, not their bytes: see loadMedia() in media_files.hpp.
-/// `name` is for errors, which are at `'name':line:column`. Errors (invalidInput): what the syntax
-/// or the node table does not have, with what was found and what expected; (unsupported) an
-/// interface with a field of a type that none can have, a command to a ROUTE whose name is not R
-/// and a number.
+/// A byte order mark (UTF-8, UTF-16, UTF-32) tells the encoding. `name` is for errors, which are at
+/// `'name':line:column`. Errors (invalidInput): what the syntax or the node table does not have,
+/// with what was found and what expected; (unsupported) an interface with a field of a type that
+/// none can have, a command to a ROUTE whose name is not R and a number.
 [[nodiscard]] Result<Document> readBt(std::string_view text, const std::string& name, Job& job);
 
 /// The text of a presentation; readBt() gives it back, floats to the bit. Errors (invalidInput)

@@ -28,10 +28,6 @@ std::string BtToken::describe() const {
     }
 }
 
-BtLexer::BtLexer(std::string_view text, std::string name) : text_(text), name_(std::move(name)) {
-    if (text_.starts_with("\xEF\xBB\xBF")) at_ = lineStart_ = 3;
-}
-
 std::string BtLexer::where(const BtToken& token) const {
     return fmt::format("'{}':{}:{}", name_, token.line, token.column);
 }

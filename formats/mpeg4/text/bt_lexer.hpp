@@ -30,7 +30,7 @@ struct BtToken {
 class BtLexer {
   public:
     /// `text` must outlive the lexer. `name` is the file's name for errors.
-    BtLexer(std::string_view text, std::string name);
+    BtLexer(std::string_view text, std::string name) : text_(text), name_(std::move(name)) {}
 
     /// The next token, not yet taken.
     [[nodiscard]] const BtToken& peek() const { return token_; }

@@ -1,5 +1,9 @@
 #include "formats/mpeg4/text/bt_reader.hpp"
 
+#include <span>
+
+#include "formats/files/text_encoding.hpp"
+
 namespace stx::mpeg4 {
 
 using Kind = BtToken::Kind;
@@ -355,7 +359,8 @@ Result<void> BtReader::readNodeList(const NodePtr& owner, int index, int depth, 
 }
 
 Result<Document> readBt(std::string_view text, const std::string& name, Job& job) {
-    return BtReader(text, name, job).read();
+    const auto utf8 = utf8FromMarked(std::as_bytes(std::span(text)));
+    return BtReader(utf8 ? textOf(*utf8) : text, name, job).read();
 }
 
 }  // namespace stx::mpeg4

@@ -1,5 +1,7 @@
 #include "formats/mpeg4/text/xmt_reader.hpp"
 
+#include "formats/mpeg4/text/xml_encoding.hpp"
+
 namespace stx::mpeg4 {
 
 Result<std::optional<Position>> XmtReader::positionOf(xml_node node, std::string_view text) const {
@@ -63,7 +65,10 @@ Result<void> XmtReader::collectIds(xml_node root) {
 }
 
 Result<Document> readXmt(std::string_view text, const std::string& name, Job& job) {
-    return XmtReader(text, name, job).read();
+    if (auto ok = job.limits.checkAllocation(text.size(), 2, "the text"); !ok)
+        return tl::unexpected(ok.error().at(fmt::format("'{}'", name)));
+    STX_TRY(const auto utf8, utf8FromXml(text, name));
+    return XmtReader(utf8 ? *utf8 : text, name, job).read();
 }
 
 }  // namespace stx::mpeg4

@@ -3,7 +3,7 @@
 #include <fstream>
 #include <limits>
 
-#include "formats/meshes/text_encoding.hpp"
+#include "formats/files/text_encoding.hpp"
 #include "formats/meshes/triangulate.hpp"
 #include "lib/capture/material_sampler.hpp"
 #include "tests/temporary_folder.hpp"

@@ -128,6 +128,48 @@ TEST(Streams, AnEntryThatNobodyKnowsPassesThrough) {
     expectStreamsKept(read);
 }
 
+/// A command that gives object descriptor 10 a stream of these bytes.
+UpdateObjectDescriptors tenOf(std::uint32_t esId, const ByteRange& data) {
+    ElementaryStream stream;
+    stream.esId = esId;
+    stream.objectTypeIndication = oti::kPng;
+    stream.streamType = StreamType::visual;
+    Sample sample;
+    sample.data = data;
+    stream.samples = {sample};
+    return {{{10, "", {stream}}}};
+}
+
+TEST(Streams, AnEsIdThatComesAgainWithOtherBytesIsAnotherTrack) {
+    const ByteRange red = ByteRange::of(Bytes(9, std::byte{1}));
+    const ByteRange redAgain = ByteRange::of(Bytes(9, std::byte{1}));
+    const ByteRange blue = ByteRange::of(Bytes(9, std::byte{2}));
+    Document document = smallScene();
+    std::uint64_t time = 0;
+    for (const ByteRange& data : {red, blue, redAgain, blue, blue})
+        document.odFrames.push_back({time += 1000, {tenOf(70, data)}});
+    document.odFrames.push_back({time += 1000, {RemoveStreams{10, {70}}}});
+    const Document read = throughMp4(document);
+    std::vector<std::uint32_t> tracks;
+    std::vector<std::byte> first;
+    for (std::uint64_t at = 1000; at <= 5000; at += 1000)
+        for (const ObjectDescriptor* od : read.objectDescriptors(at)) {
+            if (od->id != 10) continue;
+            tracks.push_back(od->streams.at(0).esId);
+            first.push_back(bytesOf(od->streams.at(0).samples.at(0)).at(0));
+        }
+    using std::byte;
+    EXPECT_EQ(first, (std::vector{byte{1}, byte{2}, byte{1}, byte{2}, byte{2}}));
+    ASSERT_EQ(tracks.size(), 5u);
+    EXPECT_EQ(tracks, (std::vector{70u, tracks[1], 70u, tracks[1], tracks[1]}));
+    EXPECT_NE(tracks[1], 70u);
+    const auto& removal = std::get<RemoveStreams>(read.odFrames.back().commands.at(0));
+    EXPECT_EQ(removal.esIds, std::vector{tracks[1]});
+    Document kept = read;  // but for what texts do not have
+    kept.odFrames.pop_back();
+    expectStreamsKept(kept);
+}
+
 TEST(Streams, AStartIsADelayInTheFileAndAStartTimeInTexts) {
     for (const std::uint64_t start : {500u, 333u}) {
         Document document = smallScene();

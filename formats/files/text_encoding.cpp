@@ -1,4 +1,4 @@
-#include "formats/meshes/text_encoding.hpp"
+#include "formats/files/text_encoding.hpp"
 
 #include <cstdint>
 
