@@ -333,7 +333,9 @@ std::string Command::jobOf(const std::vector<std::string>& without) const {
             continue;
         // A zero ends a word, as none can hold it.
         all += names.front() + '\0';
-        for (const std::string& value : option->results()) all += value + '\0';
+        // Of paths the name: machines may have copies in folders of their own.
+        for (const std::string& value : option->results())
+            all += value.substr(value.rfind('/') + 1) + '\0';
     }
     return fmt::format("{:016x}", hashOf(std::as_bytes(std::span(all))));
 }

@@ -122,8 +122,9 @@ class Command {
     [[nodiscard]] std::vector<std::string> given(const std::vector<std::string>& names) const;
     /// The options under a heading of the help that were given.
     [[nodiscard]] std::vector<std::string> givenUnder(const std::string& heading) const;
-    /// A hash of the inputs and options that were given, in 16 hexadecimal digits. Without the
-    /// options that are shared (sharedOptions()) and those of `names`.
+    /// A hash of the inputs and options that were given, of paths their last part, in 16
+    /// hexadecimal digits. Without the options that are shared (sharedOptions()) and those of
+    /// `names`.
     [[nodiscard]] std::string jobOf(const std::vector<std::string>& without) const;
     /// Error (usage) when one of `names` was given though it cannot matter. `why` goes on after the
     /// name: "is of lighting; give --light, too".
