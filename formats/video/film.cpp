@@ -146,6 +146,16 @@ Result<void> checkWhole(const Descriptor& file, std::string_view format, const s
     return {};
 }
 
+/// Pictures that may be missing: a note, or an error when `strict`.
+Result<void> tellDamage(const std::string& where, const std::string& damage, bool strict,
+                        Job& job) {
+    if (strict)
+        return failAt(where, ErrorCode::invalidInput,
+                      "{}; copy it once more, or leave out --strict", damage);
+    job.note(fmt::format("{}: {}; the others are taken, and --strict stops there", where, damage));
+    return {};
+}
+
 }  // namespace
 
 std::string_view filmFormatOf(ByteSpan head) {
@@ -258,12 +268,7 @@ Result<void> Film::select(int track, bool strict, Job& job) {
     }
     if (shown_.empty())
         return failAt(where(), ErrorCode::invalidInput, "its track of video has no picture");
-    if (!damage.empty() && strict)
-        return failAt(where(), ErrorCode::invalidInput,
-                      "{}; copy it once more, or leave out --strict", damage);
-    if (!damage.empty())
-        job.note(
-            fmt::format("{}: {}; the others are taken, and --strict stops there", where(), damage));
+    if (!damage.empty()) STX_CHECK(tellDamage(where(), damage, strict, job));
     const auto timeOf = [&](std::size_t unit) { return units_[unit].pts; };
     std::ranges::stable_sort(shown_, {}, timeOf);
     const auto again = std::unique(shown_.begin(), shown_.end(), [&](std::size_t a, std::size_t b) {

@@ -230,6 +230,17 @@ void refuseGreyDds(std::span<const std::byte> file) {
                      "DDS of grey alone is not read; save it as PNG, or as DDS with colours"};
 }
 
+/// Of a DDS the library paints black what is not there, of a TIFF what it cannot decode, and says
+/// nothing. `bytes`, of which `end` are in the file, are what it has read; TiffErrors are kept.
+void refuseDamage(const std::string& format, const Source& source, std::span<const std::byte> bytes,
+                  std::size_t end) {
+    if (format == "dds" && source.ranOut())
+        throw Failed{ErrorCode::invalidInput, "the DDS is cut off"};
+    std::string damage = TiffErrors::first();
+    if (damage.empty() && format == "tiff") damage = damageOfStrips(bytes, end);
+    if (!damage.empty()) throw Failed{ErrorCode::invalidInput, "the TIFF is damaged: " + damage};
+}
+
 using HdrPixel = std::array<float, 3>;
 
 /// `fileName`: what the file can be opened by, for formats that the library reads by name only.
@@ -297,23 +308,13 @@ void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
     void* const stored = !turned.empty() ? turned.data() : whole.empty() ? values : whole.data();
     if (!input->read_image(0, 0, 0, spec.nchannels, type, stored))
         failWith(input->geterror(), "the pixels cannot be decoded");
-    // Of this format it paints black what is not there.
-    if (format == "dds" && reader.ranOut())
-        throw Failed{ErrorCode::invalidInput, "the DDS is cut off"};
+    refuseDamage(format, reader, bytes, file.size());
     if (!turned.empty()) {
         turned = turnedUpright(std::move(turned), orientation);
         std::ranges::copy(turned.pixels(), static_cast<HdrPixel*>(values));
     }
-    // It paints black what it cannot decode, and says nothing.
-    if (!tiffErrors.first().empty())
-        throw Failed{ErrorCode::invalidInput,
-                     fmt::format("the TIFF is damaged: {}", tiffErrors.first())};
     input->close();
-    if (format == "tiff") {
-        if (const std::string damage = damageOfStrips(bytes, file.size()); !damage.empty())
-            throw Failed{ErrorCode::invalidInput, "the TIFF is damaged: " + damage};
-        turnWhiteIsZero(spec, type, values);
-    }
+    if (format == "tiff") turnWhiteIsZero(spec, type, values);
     if (!whole.empty()) pixel.take(whole, static_cast<std::uint8_t*>(values));
 }
 
