@@ -9,6 +9,7 @@
 
 #include "formats/files/deflate.hpp"
 #include "formats/images/codec_module.hpp"
+#include "formats/images/exif.hpp"
 #include "formats/images/images.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -337,6 +338,30 @@ TEST(Bmp, FourBytesAreWhatTheMasksSay) {
     const auto odd = decodeImage(bmpOf({0x3ff00000, 0xffc00, 0x3ff, 0}), "a.bmp", Limits());
     ASSERT_FALSE(odd);
     EXPECT_EQ(odd.error().code, ErrorCode::unsupported);
+}
+
+/// Its chunk begins with a TIFF, or with the header that a JPEG's has.
+TEST(Webp, IsTurnedAsItsExifSays) {
+    Bytes exif = tiffOf({}, {{0x112, 6}});
+    for (const bool header : {false, true}) {
+        if (header) {
+            const auto before = std::as_bytes(std::span("Exif\0", 6));
+            exif.insert(exif.begin(), before.begin(), before.end());
+        }
+        Bytes file;
+        append(file, 0x46464952, 4);  // "RIFF"
+        append(file, 0, 4);
+        append(file, 0x50424557, 4);  // "WEBP"
+        append(file, 0x4c385056, 4);  // "VP8L", of an odd length
+        append(file, 3, 4);
+        append(file, 0, 4);
+        append(file, 0x46495845, 4);  // "EXIF"
+        append(file, static_cast<std::uint32_t>(exif.size()), 4);
+        file.insert(file.end(), exif.begin(), exif.end());
+        EXPECT_EQ(readExif(file).orientation, 6) << header;
+        file.resize(file.size() - 1);
+        EXPECT_EQ(readExif(file).orientation, 1) << "cut off";
+    }
 }
 
 /// Colours under thin alpha come back as they are.
