@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <spawn.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -28,6 +29,27 @@ constexpr std::uint64_t kLargestNews = 1 << 16;  ///< a greeting or an error
 
 std::atomic<bool> unfiltered = false, mustFilter = false;
 
+tl::unexpected<Error> noConnection() {
+    return fail(ErrorCode::failed,
+                "no connection to a decoder can be made: {}; close other programs, or raise what "
+                "bounds open files here (ulimit -n)",
+                std::strerror(errno));
+}
+
+/// What to do where no process begins.
+std::string wayToABeginning() {
+    std::string bounds;
+    for (const auto& [resource, name] :
+         {std::pair{RLIMIT_AS, "memory (ulimit -v)"}, std::pair{RLIMIT_DATA, "data (ulimit -d)"},
+          std::pair{RLIMIT_FSIZE, "sizes of files (ulimit -f)"}}) {
+        rlimit bound = {};
+        if (::getrlimit(resource, &bound) == 0 && bound.rlim_cur != RLIM_INFINITY)
+            bounds += fmt::format("{}{}", bounds.empty() ? "" : " and ", name);
+    }
+    if (bounds.empty()) return "install the stx package anew";
+    return fmt::format("this shell bounds {}: raise that, or install the stx package anew", bounds);
+}
+
 /// A running stx-decode with the libraries of one module.
 struct Template {
     Descriptor control;
@@ -50,8 +72,7 @@ Result<Template> startTemplate(const std::vector<std::string>& modulePlaces) {
                     "stx package whole, or name the program in STX_DECODE",
                     tried);
     int ends[2] = {-1, -1};
-    if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0)
-        return fail(ErrorCode::failed, "no connection to a decoder can be made");
+    if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) return noConnection();
     made.control = Descriptor(ends[0]);
     const Descriptor low(ends[1]);
     // Above what is opened below for it.
@@ -201,8 +222,7 @@ Result<std::unique_ptr<DecoderProcess>> DecoderProcess::start(const DecoderKind&
     std::shared_ptr<const Template> from;
     for (bool again = false;; again = true) {
         int ends[2] = {-1, -1};
-        if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
-            return fail(ErrorCode::failed, "no connection to a decoder can be made");
+        if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) return noConnection();
         process = over(Descriptor(ends[0]), bounds);
         Descriptor there(ends[1]);
         STX_TRY(from, templates().launch(kind, launch, there.get(), file, from));
@@ -212,9 +232,8 @@ Result<std::unique_ptr<DecoderProcess>> DecoderProcess::start(const DecoderKind&
         if (first == First::came) break;
         if (again || first == First::late)
             return fail(ErrorCode::failed,
-                        "the decoder '{}' ended before it began, or does not answer; install the "
-                        "stx package anew",
-                        from->program);
+                        "the decoder '{}' ended before it began, or does not answer; {}",
+                        from->program, wayToABeginning());
     }
     STX_CHECK(process->meet(kind, from->program));
     return process;
@@ -236,7 +255,7 @@ Result<std::unique_ptr<DecoderProcess>> DecoderProcess::start(const DecoderKind&
     if (written) return start(kind, bounds, copy.get());
     // A bound on the size of files (ulimit -f) is one on this, too.
     STX_TRY(auto process, start(kind, bounds));
-    (void)process->send(Tag::fileIs, file);
+    process->send(Tag::fileIs, file);
     return process;
 }
 
@@ -251,7 +270,8 @@ std::unique_ptr<DecoderProcess> DecoderProcess::over(Descriptor socket,
 Result<void> DecoderProcess::meet(const DecoderKind& kind, const std::string& program) {
     Tag tag{};
     Bytes news;
-    if (!receiveMessage(tag, news, kLargestNews))
+    if (!receiveMessage(tag, news, kLargestNews) && end_ != End::senseless) return lost();
+    if (end_ == End::senseless)
         return fail(ErrorCode::failed,
                     "the decoder '{}' is of another version; install the stx package anew",
                     program);
@@ -273,25 +293,70 @@ DecoderProcess::~DecoderProcess() {
     if (process_.get() >= 0) ::syscall(SYS_pidfd_send_signal, process_.get(), SIGKILL, nullptr, 0);
 }
 
-bool DecoderProcess::send(Tag tag, ByteSpan bytes) {
-    if (!broken_) broken_ = !decoders::sendMessage(socket_.get(), tag, bytes);
-    return !broken_;
+bool DecoderProcess::heard(bool well) {
+    if (well) return true;
+    pollfd ready = {socket_.get(), POLLIN, 0};
+    char next = 0;
+    if (::poll(&ready, 1, 0) == 0)
+        end_ = End::silent;
+    else
+        end_ = ::recv(socket_.get(), &next, 1, MSG_DONTWAIT) == 1 ? End::senseless : End::killed;
+    return false;
+}
+
+void DecoderProcess::send(Tag tag, ByteSpan bytes) {
+    if (end_ == End::none) (void)decoders::sendMessage(socket_.get(), tag, bytes);
 }
 
 bool DecoderProcess::receive(void* bytes, std::size_t size) {
-    if (!broken_) broken_ = !receiveAll(socket_.get(), bytes, size, bounds_.patienceMs);
-    return !broken_;
+    return end_ == End::none && heard(receiveAll(socket_.get(), bytes, size, bounds_.patienceMs));
 }
 
 bool DecoderProcess::receiveHead(decoders::MessageHead& head) {
-    if (!broken_) broken_ = !decoders::receiveHead(socket_.get(), head, bounds_.patienceMs);
-    return !broken_;
+    if (end_ != End::none ||
+        !heard(receiveAll(socket_.get(), &head, sizeof(head), bounds_.patienceMs)))
+        return false;
+    if (head.magic != decoders::kMagic) end_ = End::senseless;
+    if (head.tag == Tag::timeUp) end_ = End::timeUp;
+    if (head.tag == Tag::crashed) end_ = End::crashed;
+    return end_ == End::none;
 }
 
 bool DecoderProcess::receiveMessage(Tag& tag, Bytes& bytes, std::uint64_t most) {
-    if (!broken_)
-        broken_ = !decoders::receiveMessage(socket_.get(), tag, bytes, most, bounds_.patienceMs);
-    return !broken_;
+    decoders::MessageHead head;
+    if (!receiveHead(head)) return false;
+    if (head.size > most) {
+        end_ = End::senseless;
+        return false;
+    }
+    tag = head.tag;
+    bytes.resize(head.size);
+    return receive(bytes.data(), bytes.size());
+}
+
+tl::unexpected<Error> DecoderProcess::lost() const {
+    switch (end_) {
+        case End::killed:
+            return fail(ErrorCode::failed,
+                        "its decoder was killed, perhaps for lack of memory; try again while less "
+                        "else runs");
+        case End::silent:
+            return fail(ErrorCode::failed,
+                        "its decoder did not answer for {:g} s; try again while less else runs",
+                        bounds_.patienceMs / 1000.0);
+        case End::timeUp:
+            return fail(ErrorCode::failed,
+                        "its decoder did not end within {} s of processor time; is the file "
+                        "damaged?",
+                        bounds_.cpuSeconds);
+        case End::crashed:
+            return fail(ErrorCode::invalidInput, "the file is damaged: its decoder crashes on it");
+        case End::senseless:
+        case End::none:  // what came was well formed, and not what was asked for
+            break;
+    }
+    return fail(ErrorCode::invalidInput,
+                "the file is damaged: what its decoder answers has no sense");
 }
 
 void prepareDecoder(const DecoderKind& kind) {

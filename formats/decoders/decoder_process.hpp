@@ -73,21 +73,30 @@ class DecoderProcess {
     DecoderProcess(const DecoderProcess&) = delete;
     DecoderProcess& operator=(const DecoderProcess&) = delete;
 
+    /// Where nobody hears it, what is received next tells.
+    void send(decoders::Tag tag, ByteSpan bytes = {});
+
     // Each is false when it is gone, says nothing for too long, or what it says has no sense; from
-    // then on they all are.
-    [[nodiscard]] bool send(decoders::Tag tag, ByteSpan bytes = {});
+    // then on they all are, and lost() says why.
     /// Bytes of a message whose head has come.
     [[nodiscard]] bool receive(void* bytes, std::size_t size);
     [[nodiscard]] bool receiveHead(decoders::MessageHead& head);
     /// A message of at most so many bytes.
     [[nodiscard]] bool receiveMessage(decoders::Tag& tag, Bytes& bytes, std::uint64_t most);
 
+    /// Why nothing more comes, in the words of who asked for a picture or a model: (invalidInput)
+    /// it crashed, or answered what has no sense; (failed) it was killed, or took too long.
+    [[nodiscard]] tl::unexpected<Error> lost() const;
+
     /// What it runs: "libavformat 59.27.100, libavcodec 59.37.100".
     [[nodiscard]] const std::string& libraries() const { return libraries_; }
     [[nodiscard]] const decoders::Hello& isolation() const { return isolation_; }
 
   private:
+    enum class End { none, crashed, timeUp, killed, silent, senseless };
     DecoderProcess() = default;
+    /// Whether all went well; else remembers why not.
+    bool heard(bool well);
     [[nodiscard]] Result<void> meet(const DecoderKind& kind, const std::string& program);
 
     Descriptor socket_;
@@ -95,7 +104,7 @@ class DecoderProcess {
     DecoderBounds bounds_;
     std::string libraries_;
     decoders::Hello isolation_;
-    bool broken_ = false;
+    End end_ = End::none;
 };
 
 /// Begins to load the libraries of a kind, beside what this process does.

@@ -17,14 +17,15 @@
 namespace stx::decoders {
 
 /// Changes with every change of what is said.
-inline constexpr std::uint32_t kWireVersion = 5;
+inline constexpr std::uint32_t kWireVersion = 6;
 inline constexpr std::uint32_t kMagic = 0x57585453 + (kWireVersion << 24);  ///< "STX", version
 
 enum class Tag : std::uint32_t {
     // Of all decoders, to this process.
     hello = 1,  ///< Hello, then the text of Module::libraries
     failure,    ///< int32 ErrorCode, text
-    timeUp,     ///< it has taken the seconds that it has
+    timeUp,     ///< it has taken the seconds that it has, and ends
+    crashed,    ///< it ends by a signal of its own making
     noMemory,   ///< it needs more memory than it has
     done,
     // Pictures.
@@ -55,8 +56,9 @@ enum class Tag : std::uint32_t {
     finishEncoder,   ///< int32 encoder
     // Video: answers, beside `done`.
     film = 400,  ///< tracks, attachments
-    index,       ///< of a part of a track: whether it is the last, access units (pts, dts,
-                 ///< duration, whether decoding can begin there, whether it is hidden)
+    index,       ///< of a part of a track: whether it is the last, text: why pictures may be
+                 ///< missing, access units (pts, dts, duration, whether decoding can begin there,
+                 ///< whether it is hidden)
     ready,       ///< uint8: the track has ended; then the times of pictures that can be taken
     picture,     ///< PictureHeader, then its samples
     encoder,     ///< bytes: the decoder's configuration

@@ -61,7 +61,7 @@ ExifNotes notesOfTiff(ByteSpan file, const TiffLayout& layout) {
     return notes;
 }
 
-/// The TIFF of a JPEG's segment APP1 or of a PNG's chunk eXIf; else empty.
+/// The TIFF of a JPEG's segment APP1, of a PNG's chunk eXIf or a WebP's EXIF; else empty.
 ByteSpan exifIn(ByteSpan file) {
     if (hasText(file, 0, "\xff\xd8")) {
         for (std::size_t at = 2; at + 4 <= file.size();) {
@@ -83,6 +83,16 @@ ByteSpan exifIn(ByteSpan file) {
             if (file.size() - at - 12 < size) return {};
             if (hasText(file, at + 4, "eXIf")) return file.subspan(at + 8, size);
             at += 12 + size;
+        }
+    } else if (hasText(file, 0, "RIFF") && hasText(file, 8, "WEBP")) {
+        for (std::size_t at = 12; at + 8 <= file.size();) {
+            const std::size_t size = __builtin_bswap32(bigEndian(file, at + 4, 4));
+            if (file.size() - at - 8 < size) return {};
+            // Some write the header of a JPEG's, too.
+            const std::size_t skip = hasText(file, at + 8, kHeader) ? kHeader.size() : 0;
+            if (hasText(file, at, "EXIF") && size > skip)
+                return file.subspan(at + 8 + skip, size - skip);
+            at += 8 + size + size % 2;
         }
     }
     return {};

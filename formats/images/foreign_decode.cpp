@@ -11,10 +11,6 @@ using decoders::Tag;
 constexpr int kMostSeconds = 30;
 constexpr std::uint64_t kLargestHeader = 1 << 20;
 
-tl::unexpected<Error> died() {
-    return fail(ErrorCode::invalidInput, "its decoder crashed or did not end; the file is damaged");
-}
-
 /// Room for the pixels that are to come, of a picture that is allowed; null when there is none.
 Result<void*> prepare(ByteSpan content, std::size_t fileBytes, const Limits& limits,
                       DecodedImage& image) {
@@ -33,6 +29,7 @@ Result<void*> prepare(ByteSpan content, std::size_t fileBytes, const Limits& lim
     image.displayWidth = facts.displayWidth;
     image.displayHeight = facts.displayHeight;
     image.linear = facts.linear != 0;
+    image.storedLargest = facts.storedLargest;
     image.premultiplied = facts.premultiplied != 0;
     const auto count = static_cast<std::size_t>(facts.width) * facts.height * facts.channels;
     if (facts.bits == 8) return image.values.emplace<0>(count).data();
@@ -47,21 +44,21 @@ Result<DecodedImage> receivePicture(DecoderProcess& process, std::size_t fileByt
     DecodedImage image;
     Tag tag{};
     Bytes content;
-    if (!process.receiveMessage(tag, content, kLargestHeader)) return died();
+    if (!process.receiveMessage(tag, content, kLargestHeader)) return process.lost();
     if (tag == Tag::failure) return tl::unexpected(errorIn(content));
-    if (tag != Tag::pictureHeader) return died();
+    if (tag != Tag::pictureHeader) return process.lost();
     STX_TRY(void* const values, prepare(content, fileBytes, limits, image));
     decoders::MessageHead head;
-    if (!values || !process.receiveHead(head)) return died();
+    if (!values || !process.receiveHead(head)) return process.lost();
     if (head.tag == Tag::failure && head.size <= kLargestHeader) {
         content.resize(head.size);
-        if (!process.receive(content.data(), content.size())) return died();
+        if (!process.receive(content.data(), content.size())) return process.lost();
         return tl::unexpected(errorIn(content));
     }
     const std::size_t size =
         std::visit([](const auto& all) { return all.size() * sizeof(all[0]); }, image.values);
     if (head.tag != Tag::pixels || head.size != size || !process.receive(values, size))
-        return died();
+        return process.lost();
     return image;
 }
 
@@ -73,7 +70,7 @@ Result<DecodedImage> decodeForeign(ByteSpan bytes, std::string_view name, const 
     STX_TRY(const auto process, DecoderProcess::start(decoders::kImages, bounds, bytes));
     decoders::Packer request;
     request.putText(name);
-    if (!process->send(Tag::decodePicture, request.bytes)) return died();
+    process->send(Tag::decodePicture, request.bytes);
     return receivePicture(*process, bytes.size(), limits);
 }
 

@@ -5,6 +5,7 @@
 #include "formats/images/exr_image.hpp"
 #include "formats/images/foreign_decode.hpp"
 #include "formats/images/npy.hpp"
+#include "formats/images/pnm.hpp"
 #include "formats/images/reader.hpp"
 #include "lib/base/placed.hpp"
 
@@ -28,6 +29,7 @@ Result<DecodedImage> readDirect(ImageReader& reader) {
     image.width = image.displayWidth = info.width;
     image.height = image.displayHeight = info.height;
     image.channels = info.channels;
+    if (info.greyBits > 0) image.storedLargest = (1 << info.greyBits) - 1;
     if (info.channels > 2) {
         image.channelNames = {"R", "G", "B", "A"};
     } else if (info.format == "png") {
@@ -137,6 +139,7 @@ Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Li
         return image;
     }
     if (isNumpy(bytes)) return at(name, decodeNumpy(bytes, limits));
+    if (isPnm(bytes)) return at(name, decodePnm(bytes, limits));
     if (isOtherKind(bytes)) {
         STX_TRY(auto image, at(name, decodeForeign(bytes, name, limits)));
         STX_CHECK(at(name, placeInDisplay(image, limits)));

@@ -39,6 +39,10 @@ struct DecodedImage {
     /// Of integers that do not reach to their largest value (video of 10 bits): the bits that they
     /// have; else 0.
     int usedBits = 0;
+    /// Of integers that decoding stretched to all of `values` (grey of 4 bits, a PGM up to 1000, a
+    /// TIFF of 32 bits, whose values are floats of -1 to 1): the largest that the file can have;
+    /// else 0.
+    double storedLargest = 0;
     std::vector<std::string> channelNames;  ///< "R", "G", "B", "A", "Y", "Z", …
     bool linear = false;                    ///< float formats (EXR, HDR): linear light
     /// Of linear colours whose primaries are not those of Rec. 709: what these are multiplied with
@@ -60,8 +64,8 @@ struct DecodedImage {
 };
 
 /// Decodes an image in memory, all of it: where a part is stored, the rest is 0. PNG, JPEG, OpenEXR
-/// and NumPy's arrays (npy.hpp) here, every other format that OpenImageIO reads in a process of its
-/// own. Header sizes are checked against the limits and against what the file can hold before
+/// NumPy's arrays (npy.hpp) and PNM here, every other format that OpenImageIO reads in a process of
+/// its own. Header sizes are checked against the limits and against what the file can hold before
 /// pixels are allocated. `name` is for messages and for formats that only their ending shows. Safe
 /// to call from several threads, none of which waits for another.
 [[nodiscard]] Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name,

@@ -14,6 +14,7 @@ struct PictureFacts {
     std::uint8_t linear = 0;
     std::uint8_t premultiplied = 0;
     std::uint8_t unused[2] = {};
+    double storedLargest = 0;  ///< see DecodedImage
 };
 
 }  // namespace stx::decoders

@@ -81,6 +81,8 @@ class PngReader final : public ImageReader {
         info_.width = static_cast<int>(header_.width);
         info_.height = static_cast<int>(header_.height);
         info_.bits = header_.bit_depth == 16 ? 16 : 8;
+        if (header_.color_type == SPNG_COLOR_TYPE_GRAYSCALE && header_.bit_depth < 8)
+            info_.greyBits = header_.bit_depth;
         const bool grey = header_.color_type == SPNG_COLOR_TYPE_GRAYSCALE ||
                           header_.color_type == SPNG_COLOR_TYPE_GRAYSCALE_ALPHA;
         const bool alpha = header_.color_type == SPNG_COLOR_TYPE_GRAYSCALE_ALPHA ||

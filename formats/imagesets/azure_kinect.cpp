@@ -221,7 +221,8 @@ int trackNamed(const Film& film, const std::string& title) {
 
 }  // namespace
 
-Result<SetDescription> describeAzureKinect(const path& given, const ImageSetOptions&, Job& job) {
+Result<SetDescription> describeAzureKinect(const path& given, const ImageSetOptions& options,
+                                           Job& job) {
     const std::string where = inQuotes(given.string());
     std::error_code ec;
     if (std::filesystem::is_directory(given, ec))
@@ -262,8 +263,8 @@ Result<SetDescription> describeAzureKinect(const path& given, const ImageSetOpti
                                      colourOnSensor(ct.width, ct.height), where));
     STX_TRY(auto openedDepth, Film::open(given, job.limits));
     const std::shared_ptr<Film> depth = std::move(openedDepth);
-    STX_CHECK(colour->select(colourTrack));
-    STX_CHECK(depth->select(depthTrack));
+    STX_CHECK(colour->select(colourTrack, options.strict, job));
+    STX_CHECK(depth->select(depthTrack, options.strict, job));
     STX_TRY(const auto pairs, pairFrames(*colour, *depth, where, job));
     STX_CHECK(checkViewCount(pairs.size(), job.limits, where));
 
@@ -293,7 +294,7 @@ Result<SetDescription> describeAzureKinect(const path& given, const ImageSetOpti
                               "a frame has another size than its track");
             stored.texture = colourOfDepth(*device, values.values, *seen);
             stored.alpha = true;
-            stored.depthBits = values.bits;
+            stored.largest = values.largest;
             stored.depth = std::move(values.values);
             return stored;
         };

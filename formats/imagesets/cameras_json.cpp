@@ -116,8 +116,8 @@ Result<void> setDepth(const Json& c, const ImageSetOptions& options, const std::
                       "--depth-unit");
     if (given) unit = options.depthUnit;
     if (!nearPlane && !unit) {
-        view.distances = [](Image<float>&, const Camera&, int bits, Job&) -> Result<void> {
-            if (bits == 32) return {};
+        view.distances = [](Image<float>&, const Camera&, int largest, Job&) -> Result<void> {
+            if (largest == 0) return {};
             return fail(ErrorCode::invalidInput,
                         "the depth is stored as integers; 'depthUnit', or 'nearPlane' and "
                         "'farPlane', must tell what they mean");
@@ -125,11 +125,11 @@ Result<void> setDepth(const Json& c, const ImageSetOptions& options, const std::
         return {};
     }
     view.distances = [unit, nearPlane, farPlane, given](Image<float>& values, const Camera& camera,
-                                                        int bits, Job& job) -> Result<void> {
-        if (bits == 32 && given) return depthIsFloats("--depth-unit");
-        if (bits == 32) return {};
-        if (unit) return scaledIntegers(*unit)(values, camera, bits, job);
-        const double last = bits == 8 ? 254 : 65534;
+                                                        int largest, Job& job) -> Result<void> {
+        if (largest == 0 && given) return depthIsFloats("--depth-unit");
+        if (largest == 0) return {};
+        if (unit) return scaledIntegers(*unit)(values, camera, largest, job);
+        const double last = largest - 1;
         for (float& v : values.pixels())
             v = v == 0 ? 0.0f
                        : static_cast<float>(*nearPlane +

@@ -46,7 +46,7 @@ int nearest(const std::vector<double>& times, double time) {
 /// A film that the command names: in the folder of the cameras, or from where we are. What the
 /// cameras' file puts into the name for {name} reaches nothing outside.
 Result<std::shared_ptr<Film>> openNamed(const path& folder, const std::string& pattern,
-                                        const Placeholders& words, Job& job) {
+                                        const Placeholders& words, bool strict, Job& job) {
     const std::string name = filled(pattern, words);
     std::error_code ec;
     const path inFolder = (folder / name).lexically_normal();
@@ -61,7 +61,7 @@ Result<std::shared_ptr<Film>> openNamed(const path& folder, const std::string& p
         return failAt(inQuotes(name), ErrorCode::io, "it exists neither in '{}' nor where stx runs",
                       folder.string());
     STX_TRY(auto film, Film::open(file, job.limits));
-    STX_CHECK(film->select(film->firstVideo()));
+    STX_CHECK(film->select(film->firstVideo(), strict, job));
     return std::shared_ptr<Film>(std::move(film));
 }
 
@@ -238,8 +238,8 @@ Result<std::vector<FilmPair>> openPairs(const std::vector<SetView>& views, const
         const Placeholders words{view.name, view.camera.width, view.camera.height, options.frame};
         FilmPair pair;
         pair.name = !each && !view.taker.empty() ? view.taker : view.name;
-        STX_TRY(pair.colour, openNamed(folder, options.texturePattern, words, job));
-        STX_TRY(pair.depth, openNamed(folder, options.depthPattern, words, job));
+        STX_TRY(pair.colour, openNamed(folder, options.texturePattern, words, options.strict, job));
+        STX_TRY(pair.depth, openNamed(folder, options.depthPattern, words, options.strict, job));
         pair.views = {i};
         pairs.push_back(std::move(pair));
     }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -100,7 +101,7 @@ Result<StoredView> readStored(const SetView& set, const ImageSetOptions& options
     stored.alpha = colour.alpha;
     STX_TRY(auto depth, readDepth(set.depth, job));
     stored.depth = std::move(depth.values);
-    stored.depthBits = depth.bits;
+    stored.largest = depth.largest;
     return stored;
 }
 
@@ -205,7 +206,7 @@ Result<void> shiftTogether(const SetView& set, const ImageSetOptions& options, C
     for (float& v : moved.pixels())
         if (hasPoint(v)) v += shift.values;
     Job notesAgain;
-    STX_CHECK(set.distances(moved, camera, stored.depthBits, notesAgain));
+    STX_CHECK(set.distances(moved, camera, stored.largest, notesAgain));
     dropImpossible(moved);
     std::int64_t pixels = 0;
     double shares = 0;
@@ -250,13 +251,13 @@ float stepShare(const Image<float>& codes, const Image<float>& distances) {
 /// (shiftTogether()).
 Result<void> toDistances(const SetView& set, const ImageSetOptions& options, Camera& camera,
                          StoredView& stored, NoDepth& noDepth, RefineReport& report, Job& job) {
-    const int bits = stored.depthBits;
+    const int largest = stored.largest, bits = std::bit_width(static_cast<unsigned>(largest));
     // What we exported ourselves comes back as it was.
-    const bool mayBeCoarse = bits <= kMostCoarseBits && !set.planes;
+    const bool mayBeCoarse = largest > 0 && bits <= kMostCoarseBits && !set.planes;
     const bool maySmooth =
-        set.distances && bits < 32 && options.refine.atImport(RefineStep::steps, mayBeCoarse);
+        set.distances && largest > 0 && options.refine.atImport(RefineStep::steps, mayBeCoarse);
     Image<float> codes = maySmooth ? stored.depth : Image<float>();
-    if (set.distances) STX_CHECK(set.distances(stored.depth, camera, bits, job));
+    if (set.distances) STX_CHECK(set.distances(stored.depth, camera, largest, job));
     noDepth = noDepthOf(set, options, stored);
     dropImpossible(stored.depth);
     if (!maySmooth ||
@@ -271,7 +272,7 @@ Result<void> toDistances(const SetView& set, const ImageSetOptions& options, Cam
     smoothDepthSteps(codes);
     const Image<float> smoothed = set.shift ? codes : Image<float>();
     Job notesAgain;
-    STX_CHECK(set.distances(codes, camera, bits, notesAgain));
+    STX_CHECK(set.distances(codes, camera, largest, notesAgain));
     dropImpossible(codes);
     double most = 0, shares = 0;
     std::int64_t pixels = 0;
@@ -401,9 +402,9 @@ Distances scaledIntegers(double unit, float alsoNone) {
 }
 
 Distances normalisedDisparity(double nearest, double farthest, bool zeroIsNone) {
-    return [=](Image<float>& values, const Camera&, int bits, Job& job) -> Result<void> {
-        if (bits == 32) return {};
-        const double largest = (1 << bits) - 1;
+    return [=](Image<float>& values, const Camera&, int most, Job& job) -> Result<void> {
+        if (most == 0) return {};
+        const double largest = most;
         const bool endless = std::isinf(farthest);
         bool atInfinity = false;
         for (float& v : values.pixels()) {

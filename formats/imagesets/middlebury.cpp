@@ -20,9 +20,9 @@ namespace {
 /// Z = baseline f / (disparity / scale + offset). Floats: NaN and infinity are unknown; integers:
 /// 0.
 auto distancesOf(double baselineTimesFocal, double scale, double offset) {
-    return [=](Image<float>& values, const Camera&, int bits, Job&) -> Result<void> {
+    return [=](Image<float>& values, const Camera&, int largest, Job&) -> Result<void> {
         for (float& v : values.pixels()) {
-            const bool known = bits == 32 ? std::isfinite(v) : v != 0;
+            const bool known = largest == 0 ? std::isfinite(v) : v != 0;
             const double disparity = v / scale + offset;
             v = known && disparity > 0 ? static_cast<float>(baselineTimesFocal / disparity) : 0.0f;
         }

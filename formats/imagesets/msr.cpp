@@ -4,6 +4,7 @@
 
 #include "formats/imagesets/msr.hpp"
 
+#include <bit>
 #include <cmath>
 
 #include "formats/files/messages.hpp"
@@ -60,10 +61,11 @@ Result<Placed> place(const MsrCamera& m, int width, int height, const std::strin
 
 /// Planar distance of each pixel whose stored value is the code of the world's Z.
 auto distancesOf(Placed placed, double minZ, double maxZ) {
-    return [placed, minZ, maxZ](Image<float>& values, const Camera& camera, int bits,
+    return [placed, minZ, maxZ](Image<float>& values, const Camera& camera, int largest,
                                 Job&) -> Result<void> {
-        if (bits != 8)
-            return fail(ErrorCode::invalidInput, "the depth has {} bits; 8 are expected", bits);
+        if (largest != 255)
+            return fail(ErrorCode::invalidInput, "the depth has {} bits; 8 are expected",
+                        largest == 0 ? 32 : std::bit_width(static_cast<unsigned>(largest)));
         const VisionCamera& v = placed.vision;
         const double right = v.fx < 0 ? -1 : 1, down = v.fy < 0 ? -1 : 1;
         for (int y = 0; y < values.height(); ++y) {

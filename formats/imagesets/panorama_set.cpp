@@ -32,7 +32,7 @@ Result<StoredView> loadPanorama(const SetView& set, const YuvColour& yuv, bool d
     stored.alpha = colour.alpha;
     STX_TRY(auto depth, readDepth(set.depth, job));
     stored.depth = std::move(depth.values);
-    stored.depthBits = depth.bits;
+    stored.largest = depth.largest;
     const int width = stored.texture.width(), height = stored.texture.height();
     if (isPair(width, height)) {
         if (const auto* coded = stored.texture.rgba8())

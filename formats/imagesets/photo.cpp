@@ -2,6 +2,7 @@
 // beside it. The camera is at the origin and looks along -Z.
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <mutex>
 #include <optional>
@@ -85,7 +86,7 @@ Result<StoredDepth> readBeside(const PictureSource& source, Job& job) {
     }
     STX_TRY(const auto picture, decodeRgba8(bytes, source.name, job.limits));
     StoredDepth out;
-    out.bits = 8;
+    out.largest = 255;
     out.lossy = true;
     out.values = Image<float>(picture.width(), picture.height());
     constexpr double kMostColour = 8;  // levels, in the mean; a photograph has more
@@ -108,14 +109,14 @@ Result<StoredDepth> storedDepth(const Photo& photo, const PhotoDepth& depth, Job
         return beside;
     }
     STX_TRY(auto decoded, photos::decodeDepth(photo, job));
-    return StoredDepth{std::move(decoded.values), decoded.bits};
+    return StoredDepth{std::move(decoded.values), (1 << decoded.bits) - 1};
 }
 
 /// What the integers of a picture beside a photo are. Errors (usage): nobody says, or an option
 /// gives another meaning to floats, which are distances.
-Result<void> readBesideCode(const path& file, const ImageSetOptions& options, int bits,
+Result<void> readBesideCode(const path& file, const ImageSetOptions& options, int largest,
                             PhotoDepth& depth) {
-    if (bits == 32) {
+    if (largest == 0) {
         const char* option = options.depthMin > 0                      ? "--depth-range"
                              : options.depthUnit > 0                   ? "--depth-unit"
                              : options.photo.nearIs != NearIs::unknown ? "--depth-near"
@@ -133,7 +134,7 @@ Result<void> readBesideCode(const path& file, const ImageSetOptions& options, in
                       "the depth is a grey picture of {} bits, which does not tell whether white "
                       "or black is near; --depth-near white or black says it, --depth-unit what a "
                       "step is",
-                      bits);
+                      std::bit_width(static_cast<unsigned>(largest)));
     depth.code.zeroIsNear = options.photo.nearIs == NearIs::black;
     return {};
 }
@@ -168,8 +169,8 @@ Result<PhotoDepth> besideDepth(const path& file, const ImageSetOptions& options,
     if ((depth.orientation >= 5) != (photo.orientation >= 5)) std::swap(size.x, size.y);
     photo.depth.width = size.x;
     photo.depth.height = size.y;
-    STX_CHECK(readBesideCode(file, options, stored.bits, depth));
-    const bool floats = stored.bits == 32;
+    STX_CHECK(readBesideCode(file, options, stored.largest, depth));
+    const bool floats = stored.largest == 0;
     photo.accuracy = floats || depth.unit > 0 ? "absolute" : "relative";
     photo.coding = floats                  ? "distance"
                    : depth.unit > 0        ? "distance in steps"
@@ -192,12 +193,12 @@ Result<void> setRange(const Photo& photo, const ImageSetOptions& options, PhotoD
     }
     if (depth.unit > 0) return {};
     if (!read) STX_SET(read, storedDepth(photo, depth, job));
-    if (read->bits == 32) return {};
-    const int largest = (1 << read->bits) - 1;
+    if (read->largest == 0) return {};
     if (given)
-        depth.code.setRange(options.depthMin, options.depthMax, read->values, largest, read->lossy);
+        depth.code.setRange(options.depthMin, options.depthMax, read->values, read->largest,
+                            read->lossy);
     else
-        depth.code.assumeRange(read->values, largest, read->lossy);
+        depth.code.assumeRange(read->values, read->largest, read->lossy);
     depth.assumed = !given;
     return {};
 }
@@ -300,7 +301,7 @@ Result<StoredView> loadPhoto(const Photo& photo, const PhotoDepth& depth, KeptDe
     auto values = kept.take();
     if (!values) STX_SET(values, storedDepth(photo, depth, job));
     stored.depth = std::move(values->values);
-    stored.depthBits = values->bits;
+    stored.largest = values->largest;
     std::string profile;
     STX_TRY(auto picture, photos::decodeColour(photo, profile, job));
     if (!profile.empty()) job.note(profile);
@@ -393,11 +394,11 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
         return loadPhoto(*photo, depth, *kept, raises, notes, own);
     };
     view.distances = [code = depth.code, unit = depth.unit](Image<float>& values,
-                                                            const Camera& camera, int bits,
+                                                            const Camera& camera, int largest,
                                                             Job& own) -> Result<void> {
-        if (bits == 32) return {};
-        if (unit > 0) return scaledIntegers(unit)(values, camera, bits, own);
-        code.toDistances(values, camera, (1 << bits) - 1);
+        if (largest == 0) return {};
+        if (unit > 0) return scaledIntegers(unit)(values, camera, largest, own);
+        code.toDistances(values, camera, largest);
         return {};
     };
     set.photo = photo;

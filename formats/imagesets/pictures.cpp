@@ -197,7 +197,7 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
 Result<StoredDepth> readDepth(const PictureSource& source, Job& job) {
     StoredDepth out;
     if (source.yuv) {
-        out.bits = source.yuv->bits;
+        out.largest = (1 << source.yuv->bits) - 1;
         STX_TRY(out.values, readYuvLuma(source.path, *source.yuv, source.frame, job.limits));
         return out;
     }
@@ -212,7 +212,7 @@ Result<StoredDepth> readDepth(const PictureSource& source, Job& job) {
                 fmt::format("'{}' says that its range is limited (16 to 235); its depth is "
                             "taken as it is coded",
                             source.name));
-        out.bits = picture.bits();
+        out.largest = (1 << picture.bits()) - 1;
         out.values = picture.luma();
         return out;
     }
@@ -224,7 +224,6 @@ Result<StoredDepth> readDepth(const PictureSource& source, Job& job) {
     }
     STX_TRY(const auto bytes, readFile(source.path, job.limits));
     STX_TRY(const auto image, decode(source, bytes, job));
-    out.bits = image.bits();
     STX_TRY(const int channel, depthChannel(image, source.name));
     out.values = Image<float>(image.width, image.height);
     std::visit(
@@ -235,6 +234,21 @@ Result<StoredDepth> readDepth(const PictureSource& source, Job& job) {
                                               static_cast<std::size_t>(channel)]);
         },
         image.values);
+    const double decodedLargest = image.bits() == 32 ? 1 : (1 << image.bits()) - 1;
+    if (image.storedLargest == 0) {
+        out.largest = image.bits() == 32 ? 0 : static_cast<int>(decodedLargest);
+        return out;
+    }
+    constexpr double kMost = 65535;
+    out.largest = static_cast<int>(std::min(image.storedLargest, kMost));
+    for (float& v : out.values.pixels()) {
+        const double stored = std::round(v / decodedLargest * image.storedLargest);
+        if (!(stored >= 0 && stored <= kMost))
+            return failAt(inQuotes(source.name), ErrorCode::invalidInput,
+                          "the depth has the integer {:.0f}; 0 to 65535 is possible, or floats",
+                          stored);
+        v = static_cast<float>(stored);
+    }
     return out;
 }
 

@@ -14,10 +14,10 @@ struct StoredColour {
 [[nodiscard]] Result<StoredColour> readColour(const PictureSource& source, const YuvColour& colour,
                                               bool deep, Job& job);
 
-/// The values of a depth or disparity image as they are stored, and their bits (32 = floats).
+/// The values of a depth or disparity image as they are stored.
 struct StoredDepth {
     Image<float> values;
-    int bits = 32;
+    int largest = 0;     ///< integer that can be stored: 255, 1023, 65535; 0: they are floats
     bool lossy = false;  ///< of a JPEG, beside a photo
 };
 [[nodiscard]] Result<StoredDepth> readDepth(const PictureSource& source, Job& job);

@@ -1,6 +1,7 @@
 #include "formats/imagesets/set_options.hpp"
 
 #include <algorithm>
+#include <bit>
 
 #include "lib/background/behind_photo.hpp"
 
@@ -109,16 +110,17 @@ Distances integersOrFloats(const ImageSetOptions& options, std::optional<double>
     const bool given = options.depthUnit > 0;
     const double unit = unitOf(options, named.value_or(kMillimetre));
     const Distances integers = given || named ? scaledIntegers(unit) : sensorIntegers(unit);
-    return [integers, given](Image<float>& values, const Camera& camera, int bits,
+    return [integers, given](Image<float>& values, const Camera& camera, int largest,
                              Job& job) -> Result<void> {
-        if (bits == 32) {
+        if (largest == 0) {
             if (given) return depthIsFloats("--depth-unit");
             return {};
         }
-        if (bits != 16)
+        if (largest <= 255)
             return fail(ErrorCode::invalidInput,
-                        "the depth has {} bits; 16 (millimetres) or floats are expected", bits);
-        return integers(values, camera, bits, job);
+                        "the depth has {} bits; 16 (millimetres) or floats are expected",
+                        std::bit_width(static_cast<unsigned>(largest)));
+        return integers(values, camera, largest, job);
     };
 }
 

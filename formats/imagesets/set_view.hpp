@@ -42,7 +42,7 @@ struct StoredView {
     Texture texture;
     bool alpha = false;  ///< the texture's alpha is the set's own coverage
     Image<float> depth;  ///< as stored; see SetView::distances
-    int depthBits = 32;  ///< of the stored values: 8, 16, or 32 for floats
+    int largest = 0;     ///< integer that depth can be stored as; 0: it is floats
     /// What of the picture belongs to a person (255: all of a pixel), of the picture's shape;
     /// empty: nobody tells.
     Image<std::uint8_t> matte;
@@ -50,9 +50,10 @@ struct StoredView {
 
 /// Turns stored values into planar distances (panoramas: ray lengths) in scene units, 0 where not
 /// known, kNoDepth (or 1e9 and more) where nothing is there. The camera has the size of the image.
-/// Stored integers may come with a fraction.
+/// Stored integers, of which `largest` is the last that can be (0: they are floats), may come with
+/// a fraction.
 using Distances =
-    std::function<Result<void>(Image<float>& values, const Camera& camera, int bits, Job& job)>;
+    std::function<Result<void>(Image<float>& values, const Camera& camera, int largest, Job& job)>;
 
 /// How far a view lies beside others of its set; 0 where they do not tell.
 struct SetShift {
@@ -145,7 +146,7 @@ struct SetDescription {
     return scaledIntegers(unit, 65535);
 }
 
-/// Distances of normalised disparity: s = code / (2^bits - 1), 1 at `nearest` and 0 at `farthest`
+/// Distances of normalised disparity: s = code / largest, 1 at `nearest` and 0 at `farthest`
 /// (scene units; infinity: 1 / distance from 0). 0 is not known where `zeroIsNone`. Floats are
 /// distances already.
 [[nodiscard]] Distances normalisedDisparity(double nearest, double farthest, bool zeroIsNone);

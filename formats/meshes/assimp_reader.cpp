@@ -415,9 +415,6 @@ class SceneConverter {
 /// What the process `of` says of the model that it was asked for.
 Result<ForeignScene> hear(DecoderProcess& of, AssimpFormat format, SideFiles& side,
                           const Limits& limits) {
-    const auto crashed = [] {
-        return fail(ErrorCode::invalidInput, "the file is damaged: its reader crashes on it");
-    };
     Tag tag{};
     Bytes content;
     while (of.receiveMessage(tag, content, limits.maxMemoryBytes)) {
@@ -439,21 +436,17 @@ Result<ForeignScene> hear(DecoderProcess& of, AssimpFormat format, SideFiles& si
             case Tag::failure:
                 return fail(ErrorCode::invalidInput, "Assimp cannot read this {} file: {}",
                             endingOf(format), errorIn(content).message);
-            case Tag::timeUp:
-                return fail(ErrorCode::invalidInput,
-                            "the model cannot be read in {} seconds; is it damaged?",
-                            kMostModelSeconds);
             case Tag::noMemory:
                 return fail(ErrorCode::invalidInput,
                             "the model needs more than the memory limit of {} MiB; raise it with "
                             "--max-memory if the file is to be trusted",
                             limits.maxMemoryBytes >> 20);
             default:
-                return crashed();
+                return of.lost();
         }
-        if (!of.send(Tag::fileIs, answer.bytes)) break;
+        of.send(Tag::fileIs, answer.bytes);
     }
-    return crashed();
+    return of.lost();
 }
 
 }  // namespace
@@ -503,7 +496,7 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         const auto stem = fileName.substr(0, fileName.find_last_of('.'));
         decoders::Packer request;
         request.putText(fmt::format("{}.{}", stem, endingOf(format)));
-        (void)process->send(Tag::readModel, request.bytes);
+        process->send(Tag::readModel, request.bytes);
         SideFiles side(files);
         STX_TRY(auto scene, hear(*process, format, side, limits));
         if (format == AssimpFormat::dae)

@@ -7,10 +7,6 @@ namespace {
 
 using decoders::Unpacker;
 
-tl::unexpected<Error> senseless() {
-    return fail(ErrorCode::invalidInput, "the file is damaged: its reader crashes on it");
-}
-
 template <class T>
 std::optional<T> optionally(Unpacker& in) {
     if (in.get<std::uint8_t>() == 0) return std::nullopt;
@@ -103,10 +99,10 @@ Result<ForeignScene::Mesh> receiveMesh(DecoderProcess& process, std::size_t node
     if (!process.receiveHead(head) || head.tag != decoders::Tag::mesh ||
         !process.receive(&facts, sizeof(facts)) ||
         !process.receive(&nameLength, sizeof(nameLength)) || nameLength > kLongestName)
-        return senseless();
+        return process.lost();
     const auto arrays = models::bytesOf(facts);
     if (!arrays || head.size != sizeof(facts) + sizeof(nameLength) + nameLength + *arrays)
-        return senseless();
+        return process.lost();
     // Nothing is behind a mesh that is larger than what may be held.
     total += *arrays;
     STX_CHECK(limits.checkAllocation(total, 1, "the model"));
@@ -121,7 +117,7 @@ Result<ForeignScene::Mesh> receiveMesh(DecoderProcess& process, std::size_t node
         !receiveArray(process, mesh.corners, facts.corners) ||
         !receiveArray(process, mesh.bones, facts.bones) ||
         !receiveArray(process, mesh.weights, facts.weights))
-        return senseless();
+        return process.lost();
     std::uint64_t corners = facts.triangles ? facts.faces * 3 : 0;
     for (const std::uint32_t count : mesh.cornerCounts) corners += count;
     const bool inside = std::ranges::all_of(
@@ -133,7 +129,7 @@ Result<ForeignScene::Mesh> receiveMesh(DecoderProcess& process, std::size_t node
         std::ranges::all_of(mesh.bones, [&](const auto& bone) { return bone.node < nodes; }) &&
         std::ranges::all_of(mesh.weights,
                             [&](const auto& weight) { return weight.vertex < facts.positions; });
-    if (corners != facts.corners || !inside || !bonesFit) return senseless();
+    if (corners != facts.corners || !inside || !bonesFit) return process.lost();
     return mesh;
 }
 
@@ -142,7 +138,7 @@ Result<ForeignScene::Mesh> receiveMesh(DecoderProcess& process, std::size_t node
 Result<ForeignScene> receiveScene(DecoderProcess& process, ByteSpan content, const Limits& limits) {
     std::uint32_t meshes = 0;
     auto scene = sceneIn(content, meshes);
-    if (!scene) return senseless();
+    if (!scene) return process.lost();
     std::uint64_t total = content.size();
     for (std::uint32_t i = 0; i < meshes; ++i) {
         STX_TRY(auto mesh, receiveMesh(process, scene->nodes.size(), limits, total));

@@ -68,8 +68,11 @@ Found findVideo(PartCheck check, Job&) {
 
 /// How well the process of a decoder is shut in.
 Found findIsolation(PartCheck, Job&) {
-    const auto process =
-        DecoderProcess::start(decoders::kModels, DecoderBounds{.memoryBytes = 256u << 20});
+    const DecoderBounds bounds{.memoryBytes = 256u << 20};
+    auto process = DecoderProcess::start(decoders::kModels, bounds);
+    // All are held alike; any that is here tells.
+    for (const auto* kind : {&decoders::kImages, &decoders::kVideo, &decoders::kHeif})
+        if (!process) process = DecoderProcess::start(*kind, bounds);
     if (!process) return {PartState::missing, process.error().message};
     const auto& held = (*process)->isolation();
     const char* landlock = held.landlock ? "Landlock" : "no Landlock";

@@ -17,8 +17,7 @@ Result<DecodedImage> decodeHeifItem(const PhotoImage& image, bool grey, const Li
     decoders::Packer request;
     request.put(image.item);
     request.put(static_cast<std::uint8_t>(grey));
-    if (!process->send(decoders::Tag::decodeItem, request.bytes))
-        return fail(ErrorCode::invalidInput, "its decoder crashed; the file is damaged");
+    process->send(decoders::Tag::decodeItem, request.bytes);
     // What a HEVC stream of few bytes may hold has no bound; the size has been checked.
     STX_TRY(auto decoded, receivePicture(*process, std::size_t{1} << 40, limits));
     if (decoded.width != image.width || decoded.height != image.height ||

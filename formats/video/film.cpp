@@ -146,6 +146,16 @@ Result<void> checkWhole(const Descriptor& file, std::string_view format, const s
     return {};
 }
 
+/// Pictures that may be missing: a note, or an error when `strict`.
+Result<void> tellDamage(const std::string& where, const std::string& damage, bool strict,
+                        Job& job) {
+    if (strict)
+        return failAt(where, ErrorCode::invalidInput,
+                      "{}; copy it once more, or leave out --strict", damage);
+    job.note(fmt::format("{}: {}; the others are taken, and --strict stops there", where, damage));
+    return {};
+}
+
 }  // namespace
 
 std::string_view filmFormatOf(ByteSpan head) {
@@ -215,7 +225,7 @@ int Film::firstVideo() const {
     return found == tracks_.end() ? -1 : static_cast<int>(found - tracks_.begin());
 }
 
-Result<void> Film::select(int track) {
+Result<void> Film::select(int track, bool strict, Job& job) {
     if (track < 0 || track >= static_cast<int>(tracks_.size()) || !tracks_[track].video)
         return failAt(where(), ErrorCode::invalidInput, "it has no track of video");
     const Track& chosenTrack = tracks_[track];
@@ -233,12 +243,15 @@ Result<void> Film::select(int track) {
     shown_.clear();
     std::vector<std::int64_t> durations;
     std::int32_t numerator = 0, denominator = 0;
+    std::string damage;
     for (bool last = false; !last;) {
         STX_TRY(const auto answer, ask(video::Tag::readOn, {}, video::Tag::index));
         video::Unpacker in(answer);
         numerator = in.get<std::int32_t>();
         denominator = in.get<std::int32_t>();
         last = in.get<std::uint8_t>() != 0;
+        std::string found = in.getText();
+        if (damage.empty()) damage = std::move(found);
         const auto count = in.get<std::uint64_t>();
         for (std::uint64_t i = 0; i < count && in.ok(); ++i) {
             Unit unit;
@@ -255,6 +268,7 @@ Result<void> Film::select(int track) {
     }
     if (shown_.empty())
         return failAt(where(), ErrorCode::invalidInput, "its track of video has no picture");
+    if (!damage.empty()) STX_CHECK(tellDamage(where(), damage, strict, job));
     const auto timeOf = [&](std::size_t unit) { return units_[unit].pts; };
     std::ranges::stable_sort(shown_, {}, timeOf);
     const auto again = std::unique(shown_.begin(), shown_.end(), [&](std::size_t a, std::size_t b) {

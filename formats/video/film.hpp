@@ -45,8 +45,10 @@ class Film {
     [[nodiscard]] const std::vector<Track>& tracks() const { return tracks_; }
     /// The first track of video; -1: none.
     [[nodiscard]] int firstVideo() const;
-    /// Chooses a track, before anything below. Errors as open(), and no picture in it.
-    [[nodiscard]] Result<void> select(int track);
+    /// Chooses a track, before anything below. Where the container is damaged, so that pictures of
+    /// it may be missing, there is a note. Errors as open(), and no picture in it; damage, too,
+    /// when `strict`.
+    [[nodiscard]] Result<void> select(int track, bool strict, Job& job);
 
     /// Turns its pictures so, and not as its track says. After select().
     void turn(video::Turn how) { turn_ = how; }

@@ -200,7 +200,7 @@ class SteadyFrames final : public VideoFrames {
     std::map<int, Error> damaged_;
 };
 
-Result<std::unique_ptr<VideoFrames>> openFilm(const fs::path& input, Job& job) {
+Result<std::unique_ptr<VideoFrames>> openFilm(const fs::path& input, bool strict, Job& job) {
     auto opened = Film::open(input, job.limits);
     if (!opened && opened.error().code == ErrorCode::unsupported)
         return fail(ErrorCode::unsupported,
@@ -209,7 +209,7 @@ Result<std::unique_ptr<VideoFrames>> openFilm(const fs::path& input, Job& job) {
     if (!opened) return propagate(opened);
     auto& film = **opened;
     const int track = film.firstVideo();
-    STX_CHECK(film.select(track));
+    STX_CHECK(film.select(track, strict, job));
     const auto videos = std::ranges::count_if(film.tracks(), &Film::Track::video);
     if (videos > 1)
         job.note(fmt::format("{} has {} tracks of video; the first is taken",
@@ -289,7 +289,7 @@ Result<std::unique_ptr<VideoFrames>> openAnyFrames(const std::vector<fs::path>& 
             return fail(ErrorCode::usage,
                         "'{}' is {}; of several inputs each must be a picture (give it alone)",
                         input.string(), folder ? "a folder" : "a video");
-        if (film) return openFilm(input, job);
+        if (film) return openFilm(input, strict, job);
         if (!y4m) continue;
         STX_TRY(auto source, ByteSource::open(input));
         STX_TRY(auto reader,

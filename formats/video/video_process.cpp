@@ -15,13 +15,12 @@ Result<std::unique_ptr<VideoProcess>> VideoProcess::start(const Limits& limits, 
 Result<Bytes> VideoProcess::ask(video::Tag request, ByteSpan bytes, video::Tag expected) {
     video::Tag tag{};
     Bytes answer;
-    if (process_->send(request, bytes) && process_->receiveMessage(tag, answer, most_)) {
+    process_->send(request, bytes);
+    if (process_->receiveMessage(tag, answer, most_)) {
         if (tag == expected) return answer;
         if (tag == video::Tag::failure) return tl::unexpected(errorIn(answer));
     }
-    return fail(ErrorCode::invalidInput,
-                "its decoder crashed or did not end; the video is damaged, or needs more memory "
-                "than --max-memory allows");
+    return process_->lost();
 }
 
 }  // namespace stx

@@ -11,6 +11,7 @@
 #include <cstdlib>
 
 #include "formats/video/ffmpeg/film_reader.hpp"
+#include "formats/video/ffmpeg/logged.hpp"
 #include "formats/video/film.hpp"
 
 using namespace stx;
@@ -106,6 +107,7 @@ void readFilm(ByteSpan bytes, const Limits& limits) {
             (void)index.get<std::int32_t>();
             (void)index.get<std::int32_t>();
             (void)index.get<std::uint8_t>();
+            (void)index.getText();  // why pictures may be missing
             const auto units = index.get<std::uint64_t>();
             std::int64_t pts = 0, dts = 0;
             for (std::uint64_t i = 0; i < units; ++i) {
@@ -134,7 +136,7 @@ void readFilm(ByteSpan bytes, const Limits& limits) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     // As the process's own memory is bounded.
     av_max_alloc(32u << 20);
-    av_log_set_level(AV_LOG_QUIET);
+    video::listenToErrors();
     Limits limits;
     limits.maxMemoryBytes = 32u << 20;
     limits.maxImageSide = 256;

@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <climits>
+#include <cstdlib>
 #include <cstring>
 #include <string>
 #include <vector>
@@ -35,10 +36,23 @@ constexpr int kMostDescriptors = 16;
 
 bool loading = true;
 
-[[noreturn]] void onTimeUp(int) {
-    static constexpr MessageHead kHead = {kMagic, Tag::timeUp, 0};
-    (void)!::write(kSocket, &kHead, sizeof(kHead));
+[[noreturn]] void onEnd(int signal) {
+    const MessageHead head = {kMagic, signal == SIGXCPU ? Tag::timeUp : Tag::crashed, 0};
+    (void)!::write(kSocket, &head, sizeof(head));
     ::_exit(1);
+}
+
+/// Who asked is told why this process ends; nothing is said where the kernel kills it.
+void sayWhyItEnds() {
+    static char room[1 << 16];  // where the stack itself has run over
+    const stack_t other = {room, 0, sizeof(room)};
+    ::sigaltstack(&other, nullptr);
+    struct sigaction how = {};
+    how.sa_handler = onEnd;
+    how.sa_flags = SA_ONSTACK | static_cast<int>(SA_RESETHAND);
+    for (const int signal : {SIGXCPU, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT})
+        ::sigaction(signal, &how, nullptr);
+    std::atexit([] { onEnd(0); });  // of libraries: this process ends by _exit()
 }
 
 struct Request {
@@ -109,7 +123,7 @@ struct Held {
     if (file >= 0) ::dup2(file, kFile);
     ::close(kControl);
     ::close_range(file < 0 ? kFile : kFile + 1, UINT_MAX, 0);
-    ::signal(SIGXCPU, onTimeUp);
+    sayWhyItEnds();
     ::signal(SIGCHLD, SIG_DFL);
     answerFiltered(file < 0 ? -1 : kFile);
     if (!greet()) ::_exit(1);

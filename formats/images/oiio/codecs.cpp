@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <exception>
 #include <mutex>
 #include <optional>
@@ -97,8 +98,7 @@ std::string formatByEnding(std::string_view ending) {
         const char* format;
     };
     static constexpr Ending kEndings[] = {
-        {"tga", "targa"},    {"tpic", "targa"},   {"pnm", "pnm"},      {"ppm", "pnm"},
-        {"pgm", "pnm"},      {"pbm", "pnm"},      {"pfm", "pnm"},      {"jp2", "jpeg2000"},
+        {"tga", "targa"},    {"tpic", "targa"},   {"pfm", "pnm"},      {"jp2", "jpeg2000"},
         {"j2k", "jpeg2000"}, {"j2c", "jpeg2000"}, {"jpc", "jpeg2000"}, {"sgi", "sgi"},
         {"rgb", "sgi"},      {"rgba", "sgi"},     {"bw", "sgi"},       {"int", "sgi"},
     };
@@ -135,6 +135,31 @@ OIIO::TypeDesc typeOfValues(const OIIO::ImageSpec& spec) {
                                                                       : OIIO::TypeDesc::FLOAT;
 }
 
+/// Whether colours hold the alpha, as a TIFF does that does not say otherwise. TGA and DDS have a
+/// place to say so; the alpha of all others is straight.
+bool isPremultiplied(const OIIO::ImageSpec& spec, const std::string& format) {
+    if (spec.alpha_channel < 0) return false;
+    const std::string_view compression = spec.get_string_attribute("compression");
+    if (format == "dds") return compression == "DXT2" || compression == "DXT4";
+    constexpr int kTgaPremultiplied = 4;
+    if (format == "targa") return spec.get_int_attribute("targa:alpha_type") == kTgaPremultiplied;
+    return format == "tiff" && spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
+}
+
+/// The largest integer that the file can have, where the library stretches it to another; else 0.
+double storedLargestOf(const OIIO::ImageSpec& spec, const std::string& format) {
+    const OIIO::TypeDesc& type = spec.format;
+    if (type.is_floating_point()) return 0;
+    const int whole = static_cast<int>(8 * type.size());
+    // Others mean bits of a pixel by this, or those of a palette's index.
+    constexpr int kPalette = 3;
+    const bool told = (format == "tiff" || format == "jpeg2000" || format == "dpx") &&
+                      spec.get_int_attribute("tiff:PhotometricInterpretation") != kPalette;
+    const int bits = told ? spec.get_int_attribute("oiio:BitsPerSample", whole) : whole;
+    if (!type.is_signed() && bits == whole && whole <= 16) return 0;
+    return std::ldexp(1.0, type.is_signed() ? bits - 1 : bits) - 1;
+}
+
 decoders::PictureFacts factsOf(const OIIO::ImageSpec& spec, const std::string& format, int bits) {
     decoders::PictureFacts facts;
     facts.bits = bits;
@@ -146,8 +171,8 @@ decoders::PictureFacts factsOf(const OIIO::ImageSpec& spec, const std::string& f
     facts.displayWidth = spec.full_width;
     facts.displayHeight = spec.full_height;
     facts.linear = bits == 32;
-    facts.premultiplied = spec.alpha_channel >= 0 && format != "bmp" &&
-                          spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
+    facts.premultiplied = isPremultiplied(spec, format);
+    facts.storedLargest = storedLargestOf(spec, format);
     return facts;
 }
 
@@ -178,6 +203,44 @@ int orientationOf(const OIIO::ImageSpec& spec, const std::string& format) {
     return format == "hdr" ? spec.get_int_attribute("Orientation", 1) : 1;
 }
 
+/// Bytes of the file, of which some that were asked for are not there.
+class Source : public OIIO::Filesystem::IOMemReader {
+  public:
+    using IOMemReader::IOMemReader;
+    std::size_t pread(void* to, std::size_t size, std::int64_t offset) override {
+        const std::size_t got = IOMemReader::pread(to, size, offset);
+        ranOut_ = ranOut_ || got < size;
+        return got;
+    }
+    [[nodiscard]] bool ranOut() const { return ranOut_; }
+
+  private:
+    bool ranOut_ = false;
+};
+
+/// The library takes grey of a DDS for a part of a colour.
+void refuseGreyDds(std::span<const std::byte> file) {
+    constexpr std::size_t kPixelFlags = 80;
+    constexpr unsigned kAlphaAlone = 2, kLuminance = 0x20000;
+    unsigned flags = 0;
+    for (std::size_t i = 0; i < 4 && kPixelFlags + i < file.size(); ++i)
+        flags |= std::to_integer<unsigned>(file[kPixelFlags + i]) << (8 * i);
+    if ((flags & (kAlphaAlone | kLuminance)) != 0)
+        throw Failed{ErrorCode::unsupported,
+                     "DDS of grey alone is not read; save it as PNG, or as DDS with colours"};
+}
+
+/// Of a DDS the library paints black what is not there, of a TIFF what it cannot decode, and says
+/// nothing. `bytes`, of which `end` are in the file, are what it has read; TiffErrors are kept.
+void refuseDamage(const std::string& format, const Source& source, std::span<const std::byte> bytes,
+                  std::size_t end) {
+    if (format == "dds" && source.ranOut())
+        throw Failed{ErrorCode::invalidInput, "the DDS is cut off"};
+    std::string damage = TiffErrors::first();
+    if (damage.empty() && format == "tiff") damage = damageOfStrips(bytes, end);
+    if (!damage.empty()) throw Failed{ErrorCode::invalidInput, "the TIFF is damaged: " + damage};
+}
+
 using HdrPixel = std::array<float, 3>;
 
 /// `fileName`: what the file can be opened by, for formats that the library reads by name only.
@@ -200,7 +263,8 @@ void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
     }
     const auto repaired = format == "tiff" ? repairedTiff(file) : std::vector<std::byte>();
     const std::span bytes = repaired.empty() ? file : std::span<const std::byte>(repaired);
-    OIIO::Filesystem::IOMemReader reader(const_cast<std::byte*>(bytes.data()), bytes.size());
+    Source reader(const_cast<std::byte*>(bytes.data()), bytes.size());
+    if (format == "dds") refuseGreyDds(file);
     OIIO::ImageSpec spec;
     bool opened = false;
     if (input->supports("ioproxy")) {
@@ -244,20 +308,13 @@ void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
     void* const stored = !turned.empty() ? turned.data() : whole.empty() ? values : whole.data();
     if (!input->read_image(0, 0, 0, spec.nchannels, type, stored))
         failWith(input->geterror(), "the pixels cannot be decoded");
+    refuseDamage(format, reader, bytes, file.size());
     if (!turned.empty()) {
         turned = turnedUpright(std::move(turned), orientation);
         std::ranges::copy(turned.pixels(), static_cast<HdrPixel*>(values));
     }
-    // It paints black what it cannot decode, and says nothing.
-    if (!tiffErrors.first().empty())
-        throw Failed{ErrorCode::invalidInput,
-                     fmt::format("the TIFF is damaged: {}", tiffErrors.first())};
     input->close();
-    if (format == "tiff") {
-        if (const std::string damage = damageOfStrips(bytes); !damage.empty())
-            throw Failed{ErrorCode::invalidInput, "the TIFF is damaged: " + damage};
-        turnWhiteIsZero(spec, type, values);
-    }
+    if (format == "tiff") turnWhiteIsZero(spec, type, values);
     if (!whole.empty()) pixel.take(whole, static_cast<std::uint8_t*>(values));
 }
 

@@ -53,6 +53,17 @@ void onWarning(const char* module, const char* format, std::va_list values) {
     if (kept().outerWarning) kept().outerWarning(module, format, values);
 }
 
+/// Turns each colour of a palette into one that the library, which divides by 257, makes its upper
+/// eight bits of; other writers multiply these by 256.
+void repairPalette(const TiffNumbers& numbers, const TiffEntry& palette,
+                   std::vector<std::byte>& file) {
+    if (palette.number > file.size() || palette.count > (file.size() - palette.number) / 2) return;
+    for (std::uint64_t i = 0; i < palette.count; ++i) {
+        const std::uint64_t at = palette.number + 2 * i;
+        numbers.write(file.data() + at, (numbers.at(at, 2) >> 8) * 257, 2);
+    }
+}
+
 }  // namespace
 
 TiffErrors::TiffErrors() {
@@ -71,7 +82,8 @@ const std::string& TiffErrors::first() {
 }
 
 std::vector<std::byte> repairedTiff(std::span<const std::byte> file) {
-    constexpr std::uint64_t kBitsPerSample = 258, kCompression = 259, kSamplesPerPixel = 277;
+    constexpr std::uint64_t kBitsPerSample = 258, kCompression = 259, kSamplesPerPixel = 277,
+                            kColorMap = 320;
     constexpr std::uint64_t kShort = 3, kAdobeDeflate = 8, kDeflate = 32946;
     const TiffNumbers numbers(file);
     const TiffLayout* const found = tiffLayoutOf(file);
@@ -95,8 +107,10 @@ std::vector<std::byte> repairedTiff(std::span<const std::byte> file) {
         if (tag < kBitsPerSample) before = i + 1;
     }
     const bool addBits = !hasBits && !several;
-    if (!addBits && deflated == 0) return {};
+    const auto palette = findTiffEntry(numbers, layout, directory, kColorMap);
+    if (!addBits && deflated == 0 && !palette) return {};
     std::vector<std::byte> mended(file.begin(), file.end());
+    if (palette) repairPalette(numbers, *palette, mended);
     if (deflated != 0) numbers.write(mended.data() + deflated, kDeflate, 2);
     if (!addBits) return mended;
     // The directory is written anew behind the rest, to which its entries go on pointing.

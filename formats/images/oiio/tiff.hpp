@@ -10,7 +10,8 @@ namespace stx::codecs {
 /// A copy of a TIFF that OpenImageIO reads right; empty when it does already. Where the first
 /// directory has no BitsPerSample it is 1 (TIFF 6.0, section 8), as in the masks of some programs,
 /// but taken for 8: the tag is added. Deflate gets its other number (32946 for 8): it inflates the
-/// first kind itself and goes on when that fails, while libtiff says so.
+/// first kind itself and goes on when that fails, while libtiff says so. Colours of a palette
+/// become such that it does not make them one too dark.
 [[nodiscard]] std::vector<std::byte> repairedTiff(std::span<const std::byte> file);
 
 /// Keeps the first error of libtiff while it lives, of any thread. One at a time.

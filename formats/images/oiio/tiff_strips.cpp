@@ -95,7 +95,7 @@ std::string damageOf(std::span<const std::byte> packed, int compression, std::ui
 
 }  // namespace
 
-std::string damageOfStrips(std::span<const std::byte> file) {
+std::string damageOfStrips(std::span<const std::byte> file, std::uint64_t end) {
     Memory memory{file};
     const auto tiff = openIn(memory);
     if (!tiff) return {};
@@ -109,7 +109,6 @@ std::string damageOfStrips(std::span<const std::byte> file) {
     const bool packBits = compression == COMPRESSION_PACKBITS;
     const bool deflate =
         compression == COMPRESSION_DEFLATE || compression == COMPRESSION_ADOBE_DEFLATE;
-    if (order != FILLORDER_MSB2LSB || !(packBits || deflate)) return {};
     const bool tiled = TIFFIsTiled(tiff.get()) != 0;
     perStrip = std::clamp<std::uint32_t>(perStrip, 1, std::max<std::uint32_t>(rows, 1));
     const std::uint32_t count =
@@ -126,15 +125,19 @@ std::string damageOfStrips(std::span<const std::byte> file) {
                             size = TIFFGetStrileByteCount(tiff.get(), i);
         // Sparse files have none for what is black.
         if (from == 0 && size == 0) continue;
-        const char* const name = tiled ? "tile" : "strip";
-        if (from > file.size() || size > file.size() - from)
-            return fmt::format("{} {} lies past the end of the file", name, i);
         const std::uint32_t first =
             planar == PLANARCONFIG_SEPARATE && inPlane != 0 ? i % inPlane * perStrip : i * perStrip;
         const std::uint64_t wanted =
             tiled ? most
                   : TIFFVStripSize64(tiff.get(),
                                      std::min(perStrip, rows > first ? rows - first : 0u));
+        const char* const name = tiled ? "tile" : "strip";
+        // Some writers count too many bytes of what is not packed.
+        const std::uint64_t needed =
+            compression == COMPRESSION_NONE ? std::min(size, wanted) : size;
+        if (from > end || needed > end - from)
+            return fmt::format("{} {} lies past the end of the file", name, i);
+        if (order != FILLORDER_MSB2LSB || !(packBits || deflate)) continue;
         const std::string damage =
             damageOf(file.subspan(from, size), compression, wanted, whole, *inflate);
         if (!damage.empty()) return fmt::format("{} {} {}", name, i, damage);

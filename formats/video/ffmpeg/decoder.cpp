@@ -1,7 +1,8 @@
 #include "formats/video/ffmpeg/decoder.hpp"
 
 #include <algorithm>
-#include <cstdarg>
+
+#include "formats/video/ffmpeg/logged.hpp"
 
 namespace stx::video {
 namespace {
@@ -15,13 +16,6 @@ constexpr AVCodecID kAllowed[] = {
     AV_CODEC_ID_MPEG1VIDEO, AV_CODEC_ID_MJPEG,   AV_CODEC_ID_FFV1,  AV_CODEC_ID_RAWVIDEO,
     AV_CODEC_ID_PNG,        AV_CODEC_ID_VP8,     AV_CODEC_ID_VP9,   AV_CODEC_ID_AV1,
     AV_CODEC_ID_HUFFYUV,    AV_CODEC_ID_FFVHUFF, AV_CODEC_ID_PRORES};
-
-/// FFV1's decoder takes a slice without its checksum for that of the picture before, whatever is
-/// asked of it, and only its log says so. One thread decodes.
-bool errorLogged = false;
-void listen(void*, int level, const char*, va_list) {
-    errorLogged = errorLogged || level <= AV_LOG_ERROR;
-}
 
 bool isAllowed(AVCodecID id) {
     return std::find(std::begin(kAllowed), std::end(kAllowed), id) != std::end(kAllowed);
@@ -92,7 +86,6 @@ void Decoder::open(AVCodecID id, const AVCodecParameters* track,
     // Damage is an error, not painted over.
     codec_->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
     codec_->error_concealment = 0;
-    if (id == AV_CODEC_ID_FFV1) av_log_set_callback(listen);
     if (const int error = avcodec_open2(codec_.get(), codec, nullptr); error < 0)
         refuse(ErrorCode::invalidInput, "its decoder of {} cannot begin: {}", avcodec_get_name(id),
                wordsOf(error));
@@ -102,7 +95,7 @@ void Decoder::push(const AVPacket* packet, std::int64_t wanted) {
     const auto damaged = [&](const std::string& why) {
         refuse(ErrorCode::invalidInput, "the video is damaged here ({})", why);
     };
-    errorLogged = false;
+    forgetErrors();
     const int sent = avcodec_send_packet(codec_.get(), packet);
     if (sent < 0 && sent != AVERROR_EOF) damaged(wordsOf(sent));
     for (;;) {
@@ -112,7 +105,9 @@ void Decoder::push(const AVPacket* packet, std::int64_t wanted) {
         if (got == AVERROR(EAGAIN) || got == AVERROR_EOF) break;
         if (got < 0) damaged(wordsOf(got));
         if (frame->decode_error_flags != 0) damaged("a picture has missing parts");
-        if (codec_->codec_id == AV_CODEC_ID_FFV1 && errorLogged)
+        // FFV1's decoder takes a slice without its checksum for that of the picture before,
+        // whatever is asked of it, and only its log says so.
+        if (codec_->codec_id == AV_CODEC_ID_FFV1 && !loggedErrors().other.empty())
             damaged("a part of a picture does not have its checksum");
         if (frame->pts == AV_NOPTS_VALUE) frame->pts = frame->best_effort_timestamp;
         ready_.push_back(std::move(frame));

@@ -2,6 +2,8 @@
 
 #include <sys/stat.h>
 
+#include "formats/video/ffmpeg/logged.hpp"
+
 namespace stx::video {
 namespace {
 
@@ -126,6 +128,7 @@ void FilmReader::select(int track) {
             static_cast<int>(i) == track ? AVDISCARD_DEFAULT : AVDISCARD_ALL;
     decoder_.emplace(*film_->streams[track]->codecpar);
     units_ = 0;
+    damage_.clear();
     rewind();
 }
 
@@ -155,11 +158,22 @@ std::vector<std::byte> FilmReader::readOn() {
         units.put(static_cast<std::uint8_t>((packet->flags & AV_PKT_FLAG_DISCARD) != 0));
     }
     const bool last = packet == nullptr;
+    // AVI's own reader skips in silence to the next thing that looks like a picture.
+    const std::uint64_t indexed =
+        std::string_view(film_->iformat->name) == "avi"
+            ? static_cast<std::uint64_t>(std::max(0, avformat_index_get_entries_count(&stream)))
+            : 0;
+    if (last && damage_.empty() && units_ < indexed)
+        damage_ = fmt::format("{} of {} in its index are there", units_, indexed);
     if (last) rewind();
     Packer out;
     out.put(static_cast<std::int32_t>(stream.time_base.num));
     out.put(static_cast<std::int32_t>(stream.time_base.den));
     out.put(static_cast<std::uint8_t>(last));
+    out.putText(
+        damage_.empty()
+            ? ""
+            : fmt::format("it is damaged, and pictures may be missing in it ({})", damage_));
     out.put(count);
     out.add(units.bytes.data(), units.bytes.size());
     return std::move(out.bytes);
@@ -172,7 +186,10 @@ const AVPacket* FilmReader::next() {
     }
     for (;;) {
         av_packet_unref(packet_.get());
+        forgetErrors();
         const int got = av_read_frame(film_.get(), packet_.get());
+        // Readers skip what they do not understand, up to where they understand again.
+        if (damage_.empty()) damage_ = loggedErrors().demuxer;
         if (got == AVERROR_EOF) return nullptr;
         if (got < 0) refuse(ErrorCode::invalidInput, "the film is cut off: {}", wordsOf(got));
         if (packet_->stream_index != track_) continue;

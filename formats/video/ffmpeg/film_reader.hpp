@@ -43,6 +43,7 @@ class FilmReader {
     std::optional<Decoder> decoder_;
     int track_ = -1;
     std::uint64_t units_ = 0;  ///< that readOn() has told
+    std::string damage_;       ///< of the container, as far as the track was read
     bool held_ = false;        ///< packet_ is still to be fed
     bool ended_ = false;
 };

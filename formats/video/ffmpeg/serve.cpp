@@ -3,6 +3,7 @@
 #include "formats/decoders/decoder_module.hpp"
 #include "formats/video/ffmpeg/encoder.hpp"
 #include "formats/video/ffmpeg/film_reader.hpp"
+#include "formats/video/ffmpeg/logged.hpp"
 #include "formats/video/wire.hpp"
 
 /// The entry of the module: requests come in, answers go out. Every error of libav* ends here.
@@ -124,7 +125,7 @@ class Server {
 };
 
 void serve(int socket, int file) {
-    av_log_set_level(AV_LOG_QUIET);
+    listenToErrors();
     Server server(file);
     Tag tag{};
     std::vector<std::byte> request;

@@ -30,28 +30,29 @@ class Setting {
     const char* name_;
 };
 
-Result<std::unique_ptr<DecoderProcess>> startProbe(int cpuSeconds = 0) {
+Result<std::unique_ptr<DecoderProcess>> startProbe(int cpuSeconds = 0, int patienceMs = 30000) {
     const Setting module("STX_PROBE", STX_PROBE_MODULE);
     const std::string input = "input";
-    return DecoderProcess::start(kProbe,
-                                 DecoderBounds{.memoryBytes = 64 << 20, .cpuSeconds = cpuSeconds},
-                                 std::as_bytes(std::span(input)));
+    return DecoderProcess::start(
+        kProbe,
+        DecoderBounds{.memoryBytes = 64 << 20, .cpuSeconds = cpuSeconds, .patienceMs = patienceMs},
+        std::as_bytes(std::span(input)));
 }
 
-bool ask(DecoderProcess& process, const std::string& what) {
+void ask(DecoderProcess& process, const std::string& what) {
     decoders::Packer request;
     request.putText(what);
     request.put(static_cast<std::int32_t>(::getpid()));
-    return process.send(Tag::decodePicture, request.bytes);
+    process.send(Tag::decodePicture, request.bytes);
 }
 
-enum class Outcome { could, couldNot, gone, timeUp };
+enum class Outcome { could, couldNot, gone };
 
 Outcome tryIt(DecoderProcess& process, const std::string& what) {
     Tag tag{};
     Bytes answer;
-    if (!ask(process, what) || !process.receiveMessage(tag, answer, 1024)) return Outcome::gone;
-    if (tag == Tag::timeUp) return Outcome::timeUp;
+    ask(process, what);
+    if (!process.receiveMessage(tag, answer, 1024)) return Outcome::gone;
     return decoders::Unpacker(answer).get<std::uint8_t>() != 0 ? Outcome::could : Outcome::couldNot;
 }
 
@@ -121,10 +122,36 @@ TEST(DecoderProcess, StartsFromSeveralThreads) {
     EXPECT_EQ(good, std::vector<int>(8, 1));
 }
 
+/// What becomes of one that was asked for this.
+void expectLost(DecoderProcess& process, const char* what, ErrorCode code, const char* message) {
+    EXPECT_EQ(tryIt(process, what), Outcome::gone) << what;
+    const Error error = process.lost().value();
+    EXPECT_EQ(error.code, code) << what;
+    EXPECT_EQ(error.message, message) << what;
+}
+
 TEST(DecoderProcess, HasItsSecondsAndNoMore) {
-    const auto process = startProbe(1);
+    const auto process = startProbe(1), waited = startProbe(0, 100);
+    ASSERT_TRUE(process && waited);
+    expectLost(**process, "go on for ever", ErrorCode::failed,
+               "its decoder did not end within 1 s of processor time; is the file damaged?");
+    expectLost(**waited, "go on for ever", ErrorCode::failed,
+               "its decoder did not answer for 0.1 s; try again while less else runs");
+}
+
+/// Only what the file did to it is the file's fault.
+TEST(DecoderProcess, ThatCrashesIsNotOneThatWasKilled) {
+    for (const char* what : {"crash", "overflow its stack", "exit as libraries do"}) {
+        const auto process = startProbe();
+        ASSERT_TRUE(process);
+        expectLost(**process, what, ErrorCode::invalidInput,
+                   "the file is damaged: its decoder crashes on it");
+    }
+    const auto process = startProbe();
     ASSERT_TRUE(process);
-    EXPECT_EQ(tryIt(**process, "go on for ever"), Outcome::timeUp);
+    expectLost(**process, "end", ErrorCode::failed,
+               "its decoder was killed, perhaps for lack of memory; try again while less else "
+               "runs");
 }
 
 TEST(DecoderProcess, ThatSaysRubbishIsLeft) {

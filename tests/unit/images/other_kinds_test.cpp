@@ -9,6 +9,7 @@
 
 #include "formats/files/deflate.hpp"
 #include "formats/images/codec_module.hpp"
+#include "formats/images/exif.hpp"
 #include "formats/images/images.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -175,6 +176,124 @@ TEST(Tiff, WhiteIsZeroIsTurnedOfAnyBits) {
         }
 }
 
+/// Its directory, which is written anew behind the file, is no pixels.
+TEST(Tiff, OneBitThatIsCutOffIsDamaged) {
+    const Bytes strip(kWidth / 8 * kHeight, std::byte{0xa7});
+    const auto file = [&](std::uint32_t at) {
+        Bytes bytes = tiffOf({}, {{256, kWidth},
+                                  {257, kHeight},
+                                  {259, 1},
+                                  {262, 1},
+                                  {273, at, 4},
+                                  {278, kHeight},
+                                  {279, static_cast<std::uint32_t>(strip.size()), 4}});
+        bytes.insert(bytes.end(), strip.begin(), strip.end());
+        return bytes;
+    };
+    const auto at = static_cast<std::uint32_t>(file(0).size() - strip.size());
+    ASSERT_TRUE(decodeImage(file(at), "mask.tif", Limits()));
+    Bytes cut = file(at);
+    cut.resize(cut.size() - 20);
+    expectDamaged(cut, "20 bytes are missing");
+}
+
+/// Writers multiply eight bits by 256 or by 257.
+TEST(Tiff, ColoursOfAPaletteAreTheirUpperBits) {
+    constexpr std::uint32_t kColours = 256;
+    const Bytes pixels = noise(kWidth * kHeight);
+    for (const std::uint32_t factor : {256u, 257u}) {
+        Bytes strip = pixels;
+        for (std::uint32_t i = 0; i < 3 * kColours; ++i) append(strip, (255 - i % 256) * factor, 2);
+        Bytes file = tiffOf(strip, {{256, kWidth},
+                                    {257, kHeight},
+                                    {258, 8},
+                                    {259, 1},
+                                    {262, 3},
+                                    {273, 8, 4},
+                                    {277, 1},
+                                    {278, kHeight},
+                                    {279, kWidth * kHeight, 4},
+                                    {320, 8 + kWidth * kHeight}});
+        file[8 + strip.size() + 2 + 9 * 12 + 5] = std::byte{3};  // 768 colours
+        file[8 + strip.size() + 2 + 9 * 12 + 4] = std::byte{0};
+        const auto image = decodeImage(file, "palette.tif", Limits());
+        ASSERT_TRUE(image) << image.error().text();
+        ASSERT_EQ(image->channels, 3);
+        EXPECT_EQ(image->storedLargest, 0);
+        for (std::size_t i = 0; i < pixels.size(); ++i)
+            ASSERT_EQ(std::get<0>(image->values)[3 * i],
+                      255 - std::to_integer<std::uint8_t>(pixels[i]))
+                << i;
+    }
+}
+
+/// Depth counts in the file's own steps, whatever they become as colours.
+TEST(Tiff, TellsTheLargestIntegerThatItCanHave) {
+    constexpr std::uint32_t kSigned = 2;
+    struct Kind {
+        std::uint32_t bits, sampleFormat;
+        double largest;
+    };
+    for (const auto& [bits, sampleFormat, largest] :
+         {Kind{8, 1, 0}, Kind{16, 1, 0}, Kind{12, 1, 4095}, Kind{16, kSigned, 32767},
+          Kind{32, kSigned, 2147483647}, Kind{32, 1, 4294967295}, Kind{32, 3, 0}}) {
+        SCOPED_TRACE(testing::Message() << bits << ' ' << sampleFormat);
+        const Bytes strip(std::size_t{kWidth} * kHeight * bits / 8, std::byte{0});
+        const auto image =
+            decodeImage(tiffOf(strip, {{256, kWidth},
+                                       {257, kHeight},
+                                       {258, bits},
+                                       {259, 1},
+                                       {262, 1},
+                                       {273, 8, 4},
+                                       {277, 1},
+                                       {278, kHeight},
+                                       {279, static_cast<std::uint32_t>(strip.size()), 4},
+                                       {339, sampleFormat}}),
+                        "depth.tif", Limits());
+        ASSERT_TRUE(image) << image.error().text();
+        EXPECT_EQ(image->storedLargest, largest);
+    }
+}
+
+/// A DDS of one row of 32-bit pixels, with these flags of the pixels' format.
+Bytes ddsOf(std::uint32_t flags, std::uint32_t bits, const Bytes& pixels) {
+    Bytes file;
+    append(file, 0x20534444, 4);  // "DDS "
+    append(file, 124, 4);
+    append(file, 0x100f, 4);
+    append(file, 1, 4);
+    append(file, static_cast<std::uint32_t>(pixels.size()) * 8 / bits, 4);
+    file.resize(76);
+    append(file, 32, 4);
+    append(file, flags, 4);
+    append(file, 0, 4);
+    append(file, bits, 4);
+    for (const std::uint32_t mask : {0xffu, 0xff00u, 0xff0000u, 0xff000000u}) append(file, mask, 4);
+    append(file, 0x1000, 4);
+    file.resize(128);
+    file.insert(file.end(), pixels.begin(), pixels.end());
+    return file;
+}
+
+TEST(Dds, AlphaIsStraightAndWhatIsMissingIsNotBlack) {
+    constexpr std::uint32_t kColourAndAlpha = 0x41, kGrey = 0x20000;
+    const Bytes pixels = noise(kWidth * 4);
+    const Bytes file = ddsOf(kColourAndAlpha, 32, pixels);
+    const auto image = decodeImage(file, "a.dds", Limits());
+    ASSERT_TRUE(image) << image.error().text();
+    EXPECT_FALSE(image->premultiplied);
+    ASSERT_EQ(image->channels, 4);
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+        ASSERT_EQ(std::get<0>(image->values)[i], std::to_integer<std::uint8_t>(pixels[i])) << i;
+    const auto cut = decodeImage(ByteSpan(file).first(file.size() - 8), "a.dds", Limits());
+    ASSERT_FALSE(cut);
+    EXPECT_EQ(cut.error().code, ErrorCode::invalidInput);
+    const auto grey = decodeImage(ddsOf(kGrey, 8, noise(kWidth)), "a.dds", Limits());
+    ASSERT_FALSE(grey);
+    EXPECT_EQ(grey.error().code, ErrorCode::unsupported);
+}
+
 /// Two rows of pixels whose bytes are 1, 2, 3, 4, 5, ...; `masks` of a BITMAPV4HEADER.
 Bytes bmpOf(const std::vector<std::uint32_t>& masks) {
     const bool v4 = masks.size() == 4;
@@ -219,6 +338,30 @@ TEST(Bmp, FourBytesAreWhatTheMasksSay) {
     const auto odd = decodeImage(bmpOf({0x3ff00000, 0xffc00, 0x3ff, 0}), "a.bmp", Limits());
     ASSERT_FALSE(odd);
     EXPECT_EQ(odd.error().code, ErrorCode::unsupported);
+}
+
+/// Its chunk begins with a TIFF, or with the header that a JPEG's has.
+TEST(Webp, IsTurnedAsItsExifSays) {
+    Bytes exif = tiffOf({}, {{0x112, 6}});
+    for (const bool header : {false, true}) {
+        if (header) {
+            const auto before = std::as_bytes(std::span("Exif\0", 6));
+            exif.insert(exif.begin(), before.begin(), before.end());
+        }
+        Bytes file;
+        append(file, 0x46464952, 4);  // "RIFF"
+        append(file, 0, 4);
+        append(file, 0x50424557, 4);  // "WEBP"
+        append(file, 0x4c385056, 4);  // "VP8L", of an odd length
+        append(file, 3, 4);
+        append(file, 0, 4);
+        append(file, 0x46495845, 4);  // "EXIF"
+        append(file, static_cast<std::uint32_t>(exif.size()), 4);
+        file.insert(file.end(), exif.begin(), exif.end());
+        EXPECT_EQ(readExif(file).orientation, 6) << header;
+        file.resize(file.size() - 1);
+        EXPECT_EQ(readExif(file).orientation, 1) << "cut off";
+    }
 }
 
 /// Colours under thin alpha come back as they are.

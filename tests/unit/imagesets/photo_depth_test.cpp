@@ -207,7 +207,7 @@ TEST(PhotoDepth, IsReadOnce) {
     const auto first = view.load(view, job);
     ASSERT_TRUE(first) << first.error().text();
     EXPECT_EQ(first->depth.at(40, 3), 50 * 150);
-    EXPECT_EQ(first->depthBits, 16);
+    EXPECT_EQ(first->largest, 65535);
     const auto again = view.load(view, job);
     ASSERT_FALSE(again);
     EXPECT_EQ(again.error().code, ErrorCode::io);

@@ -22,7 +22,8 @@ std::unique_ptr<Film> openedFilm(const std::filesystem::path& path) {
     auto film = Film::open(path, {});
     EXPECT_TRUE(film) << film.error().text();
     if (!film) return nullptr;
-    const auto chosen = (*film)->select((*film)->firstVideo());
+    Job job;
+    const auto chosen = (*film)->select((*film)->firstVideo(), true, job);
     EXPECT_TRUE(chosen) << chosen.error().text();
     return chosen ? std::move(*film) : nullptr;
 }
@@ -379,9 +380,10 @@ TEST(Films, DamageIsOneSentence) {
             }
             ASSERT_TRUE(writeFile(folder / "broken", broken));
             std::optional<Error> error;
+            Job job;
             if (auto film = Film::open(folder / "broken", {}); !film) {
                 error = film.error();
-            } else if (auto chosen = (*film)->select((*film)->firstVideo()); !chosen) {
+            } else if (auto chosen = (*film)->select((*film)->firstVideo(), true, job); !chosen) {
                 error = chosen.error();
             } else {
                 for (int k = 0; k < (*film)->count() && !error; ++k)
@@ -396,6 +398,42 @@ TEST(Films, DamageIsOneSentence) {
             EXPECT_EQ(error->text().find('\n'), std::string::npos) << error->text();
         }
         EXPECT_GT(errors, 8) << file;
+    }
+}
+
+/// Readers of containers skip what they do not understand, and pictures with it.
+TEST(Films, PicturesThatTheContainerLosesAreTold) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    films::writePictures(folder.path(), kCount, kWide, kHigh);
+    struct Coding {
+        const char *file, *arguments;
+        std::string_view head;  // of a picture, which is overwritten
+    };
+    for (const auto& [file, arguments, head] :
+         {Coding{"f.mkv", "-c:v libx264 -bf 0 -g 10 -cluster_time_limit 400", "\xa3"},
+          Coding{"f.avi", "-c:v mjpeg", "00dc"}}) {
+        films::ffmpeg(folder.path(), fmt::format("-i c%d.png {} {}", arguments, file));
+        EXPECT_TRUE(openedFilm(folder / file)) << file;
+        Bytes bytes = *readFile(folder / file, {});
+        const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+        // A SimpleBlock of track 1, at a time, without lacing.
+        std::size_t at = text.find(head, text.size() / 2);
+        while (head.size() == 1 && (text[at + 3] != '\x81' || (text[at + 6] & 0x7f) != 0))
+            at = text.find(head, at + 1);
+        for (std::size_t i = 0; i < 3; ++i) bytes[at + i] = std::byte{0};
+        ASSERT_TRUE(writeFile(folder / file, bytes));
+        Job job;
+        const auto strict = openVideoFrames({folder / file}, job, true);
+        ASSERT_FALSE(strict) << file;
+        EXPECT_EQ(strict.error().code, ErrorCode::invalidInput);
+        EXPECT_NE(strict.error().text().find("it is damaged"), std::string::npos)
+            << strict.error().text();
+        EXPECT_TRUE(job.takeNotes().empty());
+        const auto frames = openVideoFrames({folder / file}, job);
+        ASSERT_TRUE(frames) << frames.error().text();
+        EXPECT_LT((*frames)->count(), kCount);
+        EXPECT_EQ(job.takeNotes().size(), 1u) << file;
     }
 }
 
@@ -447,7 +485,8 @@ TEST(Films, MemoryIsBounded) {
     limits.maxMemoryBytes = 1u << 20;
     auto film = Film::open(folder / "f.mkv", limits);
     if (film) {
-        const auto chosen = (*film)->select(0);
+        Job job;
+        const auto chosen = (*film)->select(0, false, job);
         const auto picture = chosen ? (*film)->picture(0) : tl::unexpected(chosen.error());
         ASSERT_FALSE(picture);
         EXPECT_NE(picture.error().text().find("f.mkv'"), std::string::npos);

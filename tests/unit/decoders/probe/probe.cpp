@@ -30,6 +30,12 @@ using namespace stx::decoders;
 int parent = 0, ownFile = -1;
 char* none[] = {nullptr};
 
+int overflow(int depth) {
+    volatile char room[4096] = {};
+    room[depth % 4096] = static_cast<char>(depth);
+    return depth < 0 ? 0 : overflow(depth + 1) + room[1];
+}
+
 bool opens(const char* name, int how) {
     return ::open(name, how, 0600) >= 0;
 }
@@ -127,6 +133,8 @@ const std::map<std::string, std::function<bool()>> kTries = {
          return ++came == 1;
      }},
     {"crash", []() -> bool { std::abort(); }},
+    {"overflow its stack", [] { return overflow(1) > 0; }},
+    {"exit as libraries do", []() -> bool { std::exit(1); }},
     {"end", []() -> bool { ::_exit(0); }},
     {"go on for ever",
      [] {
