@@ -243,7 +243,7 @@ Result<void> describeMpeg4(const fs::path& path, Json& out, Job& job) {
     addOrigin(out, bundle.origin);
     if (bundle.bounds) out["bounds"] = boundsJson(*bundle.bounds, bundle.origin);
     STX_TRY(const auto images, mpeg4::StreamImages::make(document, options.folder, job.limits));
-    STX_TRY(const auto timeline, mpeg4::timelineOf(document, images));
+    STX_TRY(const auto timeline, mpeg4::timelineOf(document, images, false, &job));
     addTime(out, timeline);
     addBackground(document, images, out, job.limits);
     auto streams = Json::array();
