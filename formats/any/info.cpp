@@ -234,7 +234,8 @@ Result<void> describeMpeg4(const fs::path& path, Json& out, Job& job) {
     options.pixels = false;
     options.mayBeEmpty = true;
     options.noteMotion = false;
-    STX_TRY(const auto bundle, mpeg4::bundleFromScene(document, options, job));
+    STX_TRY(const auto bundle, within(fmt::format("'{}'", path.string()),
+                                      mpeg4::bundleFromScene(document, options, job)));
     out["nodeKind"] = mpeg4::nodeKindOf(document);
     if (!bundle.title.empty()) out["title"] = bundle.title;
     auto views = Json::array();
