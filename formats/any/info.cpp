@@ -234,7 +234,8 @@ Result<void> describeMpeg4(const fs::path& path, Json& out, Job& job) {
     options.pixels = false;
     options.mayBeEmpty = true;
     options.noteMotion = false;
-    STX_TRY(const auto bundle, mpeg4::bundleFromScene(document, options, job));
+    STX_TRY(const auto bundle, within(fmt::format("'{}'", path.string()),
+                                      mpeg4::bundleFromScene(document, options, job)));
     out["nodeKind"] = mpeg4::nodeKindOf(document);
     if (!bundle.title.empty()) out["title"] = bundle.title;
     auto views = Json::array();
@@ -243,7 +244,7 @@ Result<void> describeMpeg4(const fs::path& path, Json& out, Job& job) {
     addOrigin(out, bundle.origin);
     if (bundle.bounds) out["bounds"] = boundsJson(*bundle.bounds, bundle.origin);
     STX_TRY(const auto images, mpeg4::StreamImages::make(document, options.folder, job.limits));
-    STX_TRY(const auto timeline, mpeg4::timelineOf(document, images));
+    STX_TRY(const auto timeline, mpeg4::timelineOf(document, images, false, &job));
     addTime(out, timeline);
     addBackground(document, images, out, job.limits);
     auto streams = Json::array();

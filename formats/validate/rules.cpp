@@ -49,6 +49,7 @@ constexpr Rule kRules[] = {
     {2030, error, kBifs, "the first command replaces the scene"},
     {2031, error, kBifs, "each command fits the scene that it changes"},
     {2032, error, kBifs, "each later moment can be read"},
+    {2033, warning, "ISO/IEC 14772-1, 4.6.8", "the keys of interpolators fit their values"},
 
     {3001, error, kDibr, "nearPlane is less than farPlane"},
     {3002, error, kDibr, "nearPlane is 0 or more"},

@@ -9,6 +9,7 @@
 #include "formats/mpeg4/mapping/point_texture.hpp"
 #include "formats/mpeg4/mapping/stream_images.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
+#include "formats/mpeg4/scene/events.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
 #include "formats/validate/findings.hpp"
 #include "formats/validate/validate_background.hpp"
@@ -134,7 +135,8 @@ class DocumentValidator {
     /// Object descriptors that some node of the scene, or a command, names; or a node of one type.
     std::set<int> namedDescriptors(std::string_view type = {}) const {
         std::set<int> named;
-        forEachNode(document_.frames, [&](const NodePtr& node) {
+        // A scene with more nodes than are looked at breaks rule 2031.
+        (void)forEachNodeInside(document_.frames, [&](const NodePtr& node) {
             if (!type.empty() && !node->is(type)) return;
             for (const Node::SetField& field : node->setFields) collectUrls(field.value, named);
         });
@@ -204,6 +206,8 @@ class DocumentValidator {
                 "a command that replaces the scene");
             return;
         }
+        for (const std::string& broken : brokenKeys(document_.frames))
+            add(2033, "scene", broken, "a key for each keyValue, in ascending order");
         if (const auto last = composeScene(document_.frames); !last)
             add(2031, "scene", last.error().text(), "commands that fit");
         const auto scene = composeScene(document_.frames, document_.frames[0].time);

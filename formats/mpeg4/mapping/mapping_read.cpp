@@ -92,6 +92,7 @@ class BundleReader {
                 "nodes that place or choose their children by themselves are read as Group: {}",
                 fmt::join(shown.asGroups, ", ")));
         noteUnmoved(scene, shown);
+        if (still) noteBrokenKeys(document_, job_);
         Object object;
         STX_TRY(object.plans, makePlans(shown));
         object.notes = notesOf(shown, object.plans);
@@ -491,7 +492,8 @@ const char* nodeKindOf(const Document& document) {
     static constexpr std::array<const char*, 4> kKinds = {"SimpleTexture", "PointTexture",
                                                           "OctreeImage", "SimpleTextureV2"};
     int best = -1;
-    forEachNode(document.frames, [&](const NodePtr& node) {
+    // Of more nodes than are looked at, those before tell.
+    (void)forEachNodeInside(document.frames, [&](const NodePtr& node) {
         for (int i = 0; i < static_cast<int>(kKinds.size()); ++i) {
             if (node->is(kKinds[i]) || (i == 1 && node->is("PointTextureV2")))
                 best = std::max(best, i);

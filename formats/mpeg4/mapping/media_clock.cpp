@@ -13,7 +13,7 @@ namespace {
 /// How a MovieTexture runs.
 struct Run {
     double start = 0, stop = 0, speed = 1;
-    bool loop = false;
+    double loopsUntil = 0;
 };
 
 Run runOf(const Node& texture) {
@@ -22,7 +22,7 @@ Run runOf(const Node& texture) {
     run.start = texture.get<double>("startTime");
     run.stop = texture.get<double>("stopTime");
     run.speed = static_cast<double>(texture.get<float>("speed"));
-    run.loop = texture.get<bool>("loop");
+    run.loopsUntil = loopsUntil(texture);
     if (!std::isfinite(run.start)) run.start = 0;
     if (!std::isfinite(run.stop)) run.stop = 0;
     if (!std::isfinite(run.speed)) run.speed = 1;
@@ -91,20 +91,17 @@ Presentation presentationOf(const ElementaryStream& stream) {
 }
 
 double mediaTimeOf(const Node& texture, double duration, double now, double slack) {
-    const Run run = runOf(texture);
-    const double speed = std::abs(run.speed);
-    const bool backwards = run.speed < 0;
-    if (speed == 0 || !(duration > 0)) return 0;
-    double passed = now - run.start;
-    if (run.stop > run.start) passed = std::min(passed, run.stop - run.start);
-    if (passed < 0) return backwards ? duration : 0;
-    const double cycle = duration / speed;
-    if (run.loop) {
-        passed = std::fmod(passed, cycle);
-        if (cycle - passed < slack) passed = 0;
-    } else {
-        passed = std::min(passed, cycle);
-    }
+    const auto run = runOfMovie(texture, duration);
+    if (!run) return 0;
+    const double speed = duration / run->cycle;
+    const bool backwards = runsBackwards(texture);
+    if (now < run->start) return backwards ? duration : 0;
+    const double ended = run->end - run->start;
+    double passed = std::min(now - run->start, ended);
+    // A cycle that ends goes over to the next, but the last stays at its end.
+    const double inCycle = std::fmod(passed, run->cycle);
+    const bool atEnd = passed > slack && (inCycle <= slack || run->cycle - inCycle <= slack);
+    passed = !atEnd ? inCycle : passed < ended - slack ? 0 : run->cycle;
     return backwards ? duration - passed * speed : passed * speed;
 }
 
@@ -116,7 +113,7 @@ std::optional<ClockRun> runOfMovie(const Node& texture, double duration) {
     const Run run = runOf(texture);
     const double cycle = duration / std::abs(run.speed);
     if (run.speed == 0 || !(cycle > 0)) return {};
-    return ClockRun(run.start, cycle, run.loop, run.stop);
+    return ClockRun(run.start, cycle, run.stop, run.loopsUntil);
 }
 
 bool addChanges(const Node& texture, const Presentation& stream, double from, double until,

@@ -5,6 +5,7 @@
 
 #include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/mapping/media_clock.hpp"
+#include "formats/mpeg4/scene/events.hpp"
 #include "formats/mpeg4/scene/interpolators.hpp"
 
 namespace stx::mpeg4 {
@@ -20,11 +21,12 @@ class SceneSequence : public Sequence {
 
     Result<void> prepare(Job& job) {
         STX_TRY(images_, StreamImages::make(document_, options_.folder, job.limits));
-        STX_TRY(timeline_, timelineOf(document_, images_, options_.timesFromStart));
+        STX_TRY(timeline_, timelineOf(document_, images_, options_.timesFromStart, &job));
         // Of what stands still no picture is asked for twice.
         if (timeline_.moves()) images_.keepPictures(keptPictureBytes(job.limits));
         STX_TRY(const auto scene, composeScene(document_.frames, document_.frames.front().time));
         start_ = ownStart(scene, job.limits);
+        noteBrokenKeys(document_, job);
         // Once for all frames: it is what stands still.
         if (options_.pixels && options_.environment) {
             STX_TRY(environment_, environmentFromScene(document_, options_, job));
@@ -82,6 +84,13 @@ class SceneSequence : public Sequence {
 std::uint64_t keptPictureBytes(const Limits& limits) {
     constexpr std::uint64_t kMost = 256u << 20;
     return std::min(kMost, limits.maxMemoryBytes / 4);
+}
+
+void noteBrokenKeys(const Document& document, Job& job) {
+    for (const std::string& broken : brokenKeys(document.frames))
+        job.note(broken +
+                 "; a key for each keyValue, in ascending order, is expected: what it moves may "
+                 "stand still or jump");
 }
 
 Result<std::unique_ptr<Sequence>> sequenceFromScene(Document document,

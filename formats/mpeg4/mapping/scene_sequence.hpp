@@ -33,4 +33,7 @@ namespace stx::mpeg4 {
     std::shared_ptr<const StreamImages> images, const SceneReadOptions& options, bool still,
     Job& job);
 
+/// Says which interpolators of a document have keys that do not fit their values.
+void noteBrokenKeys(const Document& document, Job& job);
+
 }  // namespace stx::mpeg4

@@ -16,7 +16,7 @@ namespace {
 constexpr double kSmoothRate = 25;
 /// Nodes of the scene that are walked for all moments together, so that a small hostile file cannot
 /// keep us busy: as many as commands may cost, ten seconds.
-constexpr std::uint64_t kMaxVisits = 20'000'000;
+constexpr std::int64_t kMaxVisits = 20'000'000;
 /// Textures and clocks that are asked again in the time that one node is walked (0.5 and 0.05 us).
 constexpr std::uint64_t kAskedPerVisit = 10;
 
@@ -24,20 +24,6 @@ constexpr std::uint64_t kAskedPerVisit = 10;
 struct Span {
     double begin = 0, end = 0;
 };
-
-/// What is left of a span without others.
-std::vector<Span> without(const Span& all, std::vector<Span> taken) {
-    std::ranges::sort(taken, {}, &Span::begin);
-    std::vector<Span> left;
-    double from = all.begin;
-    for (const Span& span : taken) {
-        if (span.begin > from) left.push_back({from, std::min(span.begin, all.end)});
-        from = std::max(from, span.end);
-        if (from >= all.end) return left;
-    }
-    left.push_back({from, all.end});
-    return left;
-}
 
 // Whether an interpolator or a command reaches what views are made of or are placed by is not
 // asked: a moment at which nothing changes costs a frame and harms nothing.
@@ -76,6 +62,7 @@ class Moments {
     }
 
     double begin = 0;  ///< of the scene
+    std::set<std::string> lostEvents;
     std::vector<double> times;
     double end = 0;       ///< of what runs
     double coarsest = 0;  ///< seconds: the longest tick of a clock that something moves by
@@ -92,6 +79,7 @@ class Moments {
         auto scene = scenes_.at(ticksBegun(time, timescale, halfTick(1.0 / timescale, time)));
         if (!scene && first) return propagate(scene);
         if (!scene) return false;
+        lostEvents.merge((*scene)->lostEvents);
         images_.setTime(time, halfTick(1.0 / document_.odStream.timescale, time));
         for (std::size_t i = 0; i < before.size(); ++i) {
             if (images_.stream(*textures_[i]) == before[i]) continue;
@@ -99,26 +87,25 @@ class Moments {
             break;
         }
         const auto is = scenes_.structure();
-        if (first || was.views != is.views) findTextures(**scene);
+        if (first || was.views != is.views) STX_CHECK(findTextures(**scene));
         if (first || was.routes != is.routes) {
             clocks_ = clocksOf(**scene);
-            visits_ += (*scene)->routes.size();
+            visitsLeft_ -= static_cast<std::int64_t>((*scene)->routes.size());
         }
         asked_ += textures_.size() + clocks_.size();
-        if (visits_ + asked_ / kAskedPerVisit > kMaxVisits)
-            return fail(ErrorCode::unsupported,
-                        "the commands restructure the scene too often (more than {} node visits)",
-                        kMaxVisits);
+        STX_CHECK(checkVisits());
         return true;
     }
 
     /// The images of DepthImages and OctreeImages, which may run.
-    void findTextures(const Scene& scene) {
+    Result<void> findTextures(const Scene& scene) {
         textures_.clear();
         std::unordered_set<const Node*> seen;
-        forEachNode(scene.root, [&](const NodePtr& node) {
-            ++visits_;
-            if (node->info->find("diTexture") < 0) return;
+        NodeList instances;
+        const NodePtr root = withoutInstances(scene.root, visitsLeft_, instances);
+        STX_CHECK(checkVisits());
+        forEachNode(root, [&](const NodePtr& node) {
+            if (!isDepthImage(*node)) return;
             const NodePtr& texture = node->get<NodePtr>("diTexture");
             if (!texture) return;
             for (const Node::SetField& field : texture->setFields)
@@ -127,12 +114,19 @@ class Moments {
                     seen.insert(image->get()).second)
                     textures_.push_back(*image);
         });
+        return {};
+    }
+
+    [[nodiscard]] Result<void> checkVisits() const {
+        if (visitsLeft_ - static_cast<std::int64_t>(asked_ / kAskedPerVisit) >= 0) return {};
+        return fail(ErrorCode::unsupported,
+                    "the commands restructure the scene too often (more than {} node visits)",
+                    kMaxVisits);
     }
 
     struct Movie {
         const Node* texture;
         const Presentation* shown;
-        ClockRun run;
     };
 
     Result<void> addMoments(Span span) {
@@ -145,7 +139,7 @@ class Moments {
             coarsest = std::max(coarsest, shown.tick);
             const auto run = runOfMovie(*texture, shown.duration);
             if (!run || shown.shown.size() < 2) continue;
-            movies.push_back({texture.get(), &shown, *run});
+            movies.push_back({texture.get(), &shown});
             if (run->end <= kLatestMoment || run->end == kEver) all.push_back(*run);
         }
         for (const NodePtr& clock : clocks_)
@@ -155,16 +149,24 @@ class Moments {
             }
         const bool last = span.end == kEver;
         if (last) span.end = end = endOf(all, span.begin);
-        std::vector<Span> pictures;
-        for (const Movie& movie : movies) {
-            if (!addChanges(*movie.texture, *movie.shown, span.begin, span.end, times))
+        std::vector<double> pictures;
+        for (const Movie& movie : movies)
+            if (!addChanges(*movie.texture, *movie.shown, span.begin, span.end, pictures) ||
+                times.size() + pictures.size() > kMostMoments)
                 return fail(ErrorCode::unsupported, "the presentation has more than {} moments",
                             kMostMoments);
-            pictures.push_back({movie.run.start, std::min(movie.run.end, span.end)});
-        }
-        for (const Span& gap : without(span, std::move(pictures)))
-            for (const ClockRun& run : clocks) STX_CHECK(addSteps(run, gap, last));
+        std::ranges::sort(pictures);
+        for (const ClockRun& run : clocks) STX_CHECK(addSteps(run, span, last, pictures));
+        times.insert(times.end(), pictures.begin(), pictures.end());
         return {};
+    }
+
+    /// Whether a picture begins less than a step from a time: it shows what has moved, too.
+    static bool isNear(const std::vector<double>& pictures, double time, double slack) {
+        const auto next = std::ranges::lower_bound(pictures, time);
+        const double step = 1 / kSmoothRate - slack;
+        return (next != pictures.end() && *next - time < step) ||
+               (next != pictures.begin() && time - *std::prev(next) < step);
     }
 
     /// When all has ended that runs on from the last change of the scene.
@@ -186,22 +188,25 @@ class Moments {
         return until;
     }
 
-    /// The moments of a clock where no picture gives any. Of one that ends, with the step that
+    /// The moments of a clock between those of pictures. Of one that ends, with the step that
     /// reaches the end, so that all last equally long. `last`: nothing changes after the span.
-    Result<void> addSteps(const ClockRun& run, const Span& span, bool last) {
+    Result<void> addSteps(const ClockRun& run, const Span& span, bool last,
+                          const std::vector<double>& pictures) {
         const double slack = halfTick(coarsest, span.begin);
         if (run.start >= span.end || run.end <= span.begin + slack) return {};
         const double start = std::max(run.start, begin);
         const double until = std::min(run.end, span.end);
         const double first = std::ceil((std::max(start, span.begin) - start) * kSmoothRate - slack);
         const double steps = (until - start) * kSmoothRate;
-        if (static_cast<double>(times.size()) + steps - first > static_cast<double>(kMostMoments))
+        double i = first;
+        for (; i < steps && times.size() <= kMostMoments; ++i)
+            if (const double step = start + i / kSmoothRate; !isNear(pictures, step, slack))
+                times.push_back(step);
+        if (times.size() + pictures.size() > kMostMoments)
             return fail(ErrorCode::unsupported,
                         "a TimeSensor runs for {:g} s; that and what else moves are more than {} "
                         "moments",
                         until - std::max(start, span.begin), kMostMoments);
-        double i = first;
-        for (; i < steps; ++i) times.push_back(start + i / kSmoothRate);
         if (run.end > span.end) return {};
         const double before = start + (i - 1) / kSmoothRate;
         if (before >= run.end - halfTick(coarsest, run.end)) return {};
@@ -215,7 +220,8 @@ class Moments {
     SceneInTime scenes_;
     std::vector<double> descriptors_;  ///< when they change, ascending
     std::vector<NodePtr> textures_, clocks_;
-    std::uint64_t visits_ = 0, asked_ = 0;
+    std::int64_t visitsLeft_ = kMaxVisits;
+    std::uint64_t asked_ = 0;
 };
 
 }  // namespace
@@ -244,9 +250,12 @@ bool isActive(const Node& node, StreamImages& images, double now) {
 }
 
 Result<Timeline> timelineOf(const Document& document, const StreamImages& images,
-                            bool timesFromStart) {
+                            bool timesFromStart, Job* job) {
     Moments moments(document, images, timesFromStart);
     STX_CHECK(moments.find());
+    if (job != nullptr && !moments.lostEvents.empty())
+        job->note(fmt::format("commands move nothing through these, which are not followed: {}",
+                              fmt::join(moments.lostEvents, ", ")));
     Timeline line;
     std::vector<double>& times = line.times = std::move(moments.times);
     const double begin = moments.begin, end = moments.end, coarsest = moments.coarsest;

@@ -7,15 +7,16 @@ namespace stx::mpeg4 {
 
 /// When a presentation changes, by the film's own clock where a note tells how that begins: at
 /// least one moment. That is at commands, where an object descriptor brings a shown texture another
-/// stream, and at each picture; where a clock runs and no pictures do, 25 moments a second and the
-/// one at its end. Clocks and movies run by their fields as commands have left them at each moment.
-/// What loops without a stop does so until all else has ended and its cycle then under way, too; at
-/// least once. Moments of two streams within half a tick of the coarser clock are one. Of a scene
-/// whose commands do not fit it, only commands are moments from there on.
+/// stream, and at each picture; where a clock runs, 25 moments a second and the one at its end, but
+/// none less than a step from a picture. Clocks and movies run by their fields as commands have
+/// left them at each moment. What loops without a stop does so until all else has ended and its
+/// cycle then under way, too; at least once. Moments of two streams within half a tick of the
+/// coarser clock are one. Of a scene whose commands do not fit it, only commands are moments from
+/// there on.
 /// Errors: (unsupported) more than four million moments, or too many nodes to look at.
-/// `timesFromStart`: as SceneReadOptions has it.
+/// `timesFromStart`: as SceneReadOptions has it. `job` is told which events of commands are lost.
 [[nodiscard]] Result<Timeline> timelineOf(const Document& document, const StreamImages& images,
-                                          bool timesFromStart = false);
+                                          bool timesFromStart = false, Job* job = nullptr);
 
 /// What a film's own clock shows when the presentation begins, in seconds.
 [[nodiscard]] double ownStart(const Scene& scene, const Limits& limits);

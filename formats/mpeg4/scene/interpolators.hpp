@@ -21,28 +21,30 @@ struct ClockRun {
     double cycle = 0;  ///< above 0
     double end = 0;    ///< when it becomes inactive; kEver where it loops and does not stop
 
-    /// A stopTime counts only after the start.
-    ClockRun(double startTime, double cycleSeconds, bool loop, double stopTime);
+    /// The cycle that is under way at `loopsUntil` is the last; the first one always is run, but
+    /// for a stopTime, which counts only after the start.
+    ClockRun(double startTime, double cycleSeconds, double stopTime, double loopsUntil);
     /// Not when it ends within `slack`.
     [[nodiscard]] bool activeAt(double now, double slack) const {
         return start <= now + slack && now + slack < end;
     }
 };
 
+/// Until when a node begins its cycle anew: kEver, or when a command has ended that.
+[[nodiscard]] double loopsUntil(const Node& timeDependent);
+
 /// Nothing of a TimeSensor that does not run: it is not enabled, or its times are not usable.
 [[nodiscard]] std::optional<ClockRun> runOfClock(const Node& timeSensor);
 
 /// A clock's part of its cycle in [0, 1] at a time; nothing while it has never run. After its end:
-/// where it stopped. `now` is in seconds of the scene.
-[[nodiscard]] std::optional<float> fractionOf(const Node& timeSensor, double now);
+/// where it stopped. `now` is in seconds of the scene, and may be `slack` off. The end of each
+/// cycle is 1 (ISO/IEC 14772-1, 6.50).
+[[nodiscard]] std::optional<float> fractionOf(const Node& timeSensor, double now, double slack);
 
 /// The TimeSensors whose fraction_changed a route leaves, each once.
 [[nodiscard]] std::vector<NodePtr> clocksOf(const Scene& scene);
 
-/// Sets the fields that routes reach as they are at `now`: Position-, Orientation-, Scalar-, Color-
-/// and PositionInterpolator2D, and Valuator-free chains of routes behind them. Each route works
-/// once, so that circles of routes end (ISO/IEC 14772-1, 4.10.4). Values of another type than the
-/// field's, and interpolators whose keys and values do not fit each other, are passed over.
+/// Sets the fields that routes reach as they are at `now`, as Events does.
 void applyInterpolators(Scene& scene, double now);
 
 /// What clocks send to that is not followed here, as `TYPE.event TO TYPE.field`: ROUTEs into

@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -154,6 +156,10 @@ struct Node : std::enable_shared_from_this<Node> {
     /// need one (a name, several uses, a route or a command that names them): see assignNodeIds.
     std::uint32_t defId = 0;
     std::string defName;  ///< DEF name of the text forms and of BIFS with USENAMES; may be empty
+    /// Of a scene in time. When a command has last ended that the node loops, in seconds.
+    double loopedUntil = -std::numeric_limits<double>::infinity();
+    /// Of an instance in a scene in time: what the times in its body count from, in seconds.
+    double begin = 0;
 
     struct SetField {
         int index;  ///< into info->fields
@@ -198,6 +204,11 @@ struct Node : std::enable_shared_from_this<Node> {
   private:
     [[nodiscard]] const SetField* findSet(int fieldIndex) const;
 };
+
+/// Of either version; the fields of an instance of a PROTO say nothing.
+[[nodiscard]] inline bool isDepthImage(const Node& node) {
+    return !node.proto && (node.is("DepthImage") || node.is("DepthImageV2"));
+}
 
 /// A node of a type; null when the table has none of that name.
 [[nodiscard]] NodePtr makeNode(std::string_view typeName);
@@ -338,6 +349,9 @@ struct Scene {
     /// and the nodes of which fields have other values.
     bool restructured = true;
     std::unordered_set<const Node*> changed = {};
+    /// Events of commands that have no effect here, as `TYPE.event`, and routes that these were to
+    /// take, as textOf() has them.
+    std::set<std::string> lostEvents = {};
 };
 
 /// Calls `visit` for each node reachable from `root` once, parents before children, in field order.
@@ -347,8 +361,9 @@ void forEachNode(const Command& command, const std::function<void(const NodePtr&
 /// The same for every node of all commands, each once.
 void forEachNode(const std::vector<CommandFrame>& frames,
                  const std::function<void(const NodePtr&)>& visit);
-/// The same of a command, but only where `visit` says so with what is below a node.
+/// The same, but only where `visit` says so with what is below a node.
 void walkNodes(const Command& command, const std::function<bool(const NodePtr&)>& visit);
+void walkNodes(const NodePtr& root, const std::function<bool(const NodePtr&)>& visit);
 
 /// Compares everything but node-valued fields bit for bit.
 [[nodiscard]] bool sameValue(const FieldValue& a, const FieldValue& b);
@@ -357,11 +372,35 @@ void walkNodes(const Command& command, const std::function<bool(const NodePtr&)>
 /// contains itself.
 [[nodiscard]] Result<int> nestingDepth(const NodePtr& root);
 
-/// What an instance of a PROTO shows: a copy of the first node of the body, with the values of the
-/// instance where the body has a link. Null for an EXTERNPROTO. `copied`: how many nodes were.
-[[nodiscard]] NodePtr bodyOf(const Node& instance, std::size_t& copied);
+/// A copy of the body of a PROTO, with the values of the instance where it has a link; the first
+/// node is what the instance shows. Empty for an EXTERNPROTO. `copied`: how many nodes were.
+[[nodiscard]] NodeList bodyOf(const Node& instance, std::size_t& copied);
 
-/// Adds seconds to the startTime and stopTime of a node where it has values for them.
+/// A graph as it is shown: what an instance of a PROTO shows is in its place, and nothing where it
+/// shows nothing. `root` itself where there is no instance; else what is above one is a copy, and
+/// all others are the same nodes. Takes the nodes that are looked at from `budget`; null, with
+/// that below 0, where it does not suffice. Adds the instances.
+[[nodiscard]] NodePtr withoutInstances(NodePtr root, std::int64_t& budget, NodeList& instances);
+
+/// As forEachNode(), but with all nodes of its body in place of each instance of a PROTO, and with
+/// those that are in several instances visited again. False where there are more nodes than are
+/// looked at: a few PROTOs that use each other in turn can have any number.
+[[nodiscard]] bool forEachNodeInside(const std::vector<CommandFrame>& frames,
+                                     const std::function<void(const NodePtr&)>& visit);
+
+/// The nodes of the body of a PROTO and of those that it uses, as they are written; each PROTO
+/// once.
+void forEachNodeOf(const Proto& proto, const std::function<void(const NodePtr&)>& visit);
+
+/// Whether a field is a moment and not a duration: a startTime or stopTime, or a field of an
+/// instance that gives one its value.
+[[nodiscard]] bool isMoment(const Node& node, int field);
+/// The same of `loop`, and of any field of a node that has a `url`.
+[[nodiscard]] bool isLoop(const Node& node, int field);
+[[nodiscard]] bool isOfMedia(const Node& node, int field);
+
+/// Makes the moments of a node that comes at `seconds` moments of the scene: all have a value then,
+/// as 0 is one, too.
 void shiftTimes(Node& node, double seconds);
 
 /// The scene after the commands of all frames with time <= `until` on copies of their nodes. Errors

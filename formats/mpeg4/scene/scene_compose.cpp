@@ -3,18 +3,12 @@
 #include <unordered_map>
 #include <unordered_set>
 
-#include "formats/mpeg4/scene/scene.hpp"
+#include "formats/mpeg4/scene/events.hpp"
 
 // Commands applied to copies of their nodes.
 
 namespace stx::mpeg4 {
 namespace {
-
-/// Whether a field is a moment and not a duration.
-bool isMoment(const NodeInfo& node, int field) {
-    const FieldInfo& info = node.fields[field];
-    return info.type == FieldType::SFTime && (info.name == "startTime" || info.name == "stopTime");
-}
 
 /// Whether a field takes no event while its node is active (ISO/IEC 14772-1, 6.28 and 6.50).
 bool isHeldWhileActive(const NodeInfo& node, int field) {
@@ -90,7 +84,7 @@ class Composer {
                 auto& copy = copies_[node.get()];
                 if (copy) return false;  // so is all below it
                 copy = std::make_shared<Node>(*node);
-                if (begin_ != 0) shiftTimes(*copy, begin_);
+                shiftTimes(*copy, begin_);
                 fresh.push_back(copy.get());
                 return true;
             });
@@ -227,15 +221,60 @@ class Composer {
         scene_.restructured = true;
         if (views) ++structure_.views;
     }
-    void noteRoutes() { ++structure_.routes; }
+    void noteRoutes() {
+        ++structure_.routes;
+        events_.reset();
+    }
 
     /// Whether what is in a field of grouping nodes matters by the views in it alone; what is in
     /// all others may be part of a view.
     static bool isInSpace(Ndt type) { return type == Ndt::SF3DNode || type == Ndt::SF2DNode; }
     Result<bool> holdsViews(const FieldValue& value) {
         STX_TRY(const auto nodes, below(value));
-        return std::ranges::any_of(
-            nodes, [](const Node* node) { return node->info->find("diTexture") >= 0; });
+        return std::ranges::any_of(nodes, [&](const Node* node) {
+            return isDepthImage(*node) || (node->proto && holdsViews(*node->proto));
+        });
+    }
+    bool holdsViews(const Proto& proto) {
+        const auto known = protosWithViews_.try_emplace(&proto, false);
+        bool& holds = known.first->second;
+        if (known.second)
+            forEachNodeOf(proto,
+                          [&](const NodePtr& node) { holds = holds || isDepthImage(*node); });
+        return holds;
+    }
+
+    // ---- events
+
+    /// Gives a field a value that comes to it as an event. False where it takes none.
+    bool give(const NodePtr& node, int field, const FieldValue& value) {
+        const bool* loops = std::get_if<bool>(&node->value(field));
+        if (loops && *loops && isLoop(*node, field)) node->loopedUntil = now_;
+        if (!node->set(field, value)) return false;
+        scene_.changed.insert(node.get());
+        // The copies of its body are others then.
+        if (isNodes(value) || (node->proto && isOfMedia(*node, field))) noteNodes(true);
+        return true;
+    }
+    bool giveByRoute(const NodePtr& node, int field, const FieldValue& value) {
+        if (isHeldWhileActive(*node->info, field) && active_ && active_(*node, now_)) return false;
+        return give(node, field, value);
+    }
+    /// Follows the routes of an event that a command makes: `send` tells how many there were.
+    template <class Send>
+    Result<void> follow(const Send& send) {
+        if (scene_.routes.empty()) return {};
+        if (!events_) {
+            events_.emplace(
+                scene_,
+                [this](const auto& node, int field, const auto& value) {
+                    return giveByRoute(node, field, value);
+                },
+                &scene_.lostEvents);
+            STX_CHECK(useBudget(scene_.routes.size()));
+        }
+        events_->nextStamp();
+        return useBudget(send(*events_));
     }
 
     // ---- commands
@@ -340,33 +379,36 @@ class Composer {
             active_(*c.target, now_))
             return {};
         if (double* time = std::get_if<double>(&c.value);
-            time != nullptr && isMoment(*c.target->info, c.field))
+            time != nullptr && isMoment(*c.target, c.field))
             *time += begin_;
-        if (!c.target->set(c.field, c.value))
+        const std::string& name = c.target->info->fields[c.field].name;
+        if (!give(c.target, c.field, c.value))
             return fail(ErrorCode::invalidInput, "{}.{} does not take this value",
-                        c.target->info->name, c.target->info->fields[c.field].name);
+                        c.target->info->name, name);
         indexAdded(c.value, c.target.get());
-        if (isNodes(c.value)) noteNodes(true);
-        scene_.changed.insert(c.target.get());
-        return {};
+        return follow([&](Events& events) { return events.send(c.target, name, c.value); });
     }
 
     Result<void> applyEvent(ReplaceField& c) {
         const std::string& event = c.target->info->fields[c.field].name;
         const int children = c.target->info->find("children");
         const NodeList* nodes = std::get_if<NodeList>(&c.value);
-        if (children < 0 || nodes == nullptr) return {};
-        if (event == "addChildren") {
+        const float* fraction = std::get_if<float>(&c.value);
+        if (children >= 0 && nodes != nullptr && event == "addChildren") {
             STX_CHECK(checkNotInside(c.target, c.value));
             NodeList& list = std::get<NodeList>(c.target->edit(children));
             list.insert(list.end(), nodes->begin(), nodes->end());
             indexAdded(c.value, c.target.get());
             noteNodes(true);
-        } else if (event == "removeChildren") {
+        } else if (children >= 0 && nodes != nullptr && event == "removeChildren") {
             std::erase_if(std::get<NodeList>(c.target->edit(children)), [&](const NodePtr& node) {
                 return std::find(nodes->begin(), nodes->end(), node) != nodes->end();
             });
             noteNodes(true);
+        } else if (fraction != nullptr && event == "set_fraction" && isInterpolator(*c.target)) {
+            return follow([&](Events& events) { return events.setFraction(c.target, *fraction); });
+        } else {
+            scene_.lostEvents.insert(fmt::format("{}.{}", c.target->info->name, event));
         }
         return {};
     }
@@ -418,6 +460,8 @@ class Composer {
                                     target->info->name, info.name, size);
                     if constexpr (std::is_same_v<Item, NodePtr>)
                         if (what != Change::insert) gone = list[at];
+                    // Those behind it are moved.
+                    if (what != Change::replace) compared_ += static_cast<std::uint64_t>(size - at);
                     if (what == Change::remove)
                         list.erase(list.begin() + at);
                     else if (what == Change::insert)
@@ -429,6 +473,7 @@ class Composer {
             },
             target->edit(field));
         STX_CHECK(done);
+        STX_CHECK(useBudget(0));
         scene_.changed.insert(target.get());
         if (!isNodes(item) && !isNodes(gone)) return {};
         indexAdded(item, target.get());
@@ -441,9 +486,10 @@ class Composer {
 
     Result<void> apply(InsertRoute& c) {
         STX_CHECK(useBudget(1));
-        noteRoutes();
+        ++structure_.routes;
         noteEnds(c.route);
         scene_.routes.push_back(c.route);
+        if (events_) events_->addLast();
         return {};
     }
     Result<void> apply(DeleteRoute& c) {
@@ -468,6 +514,8 @@ class Composer {
     /// The nodes that have one in a field, and some that had it there.
     std::unordered_map<const Node*, std::vector<Node*>> parents_;
     std::unordered_set<const Node*> routed_;  ///< ends of routes, and some that were
+    std::unordered_map<const Proto*, bool> protosWithViews_;
+    std::optional<Events> events_;  ///< of the routes, where a command has made some
     std::uint64_t visits_ = 0, compared_ = 0;
     std::size_t count_ = 0;  ///< of commands
     double now_ = 0, begin_ = 0;
@@ -477,13 +525,6 @@ class Composer {
 };
 
 }  // namespace
-
-void shiftTimes(Node& node, double seconds) {
-    for (Node::SetField& field : node.setFields)
-        if (double* time = std::get_if<double>(&field.value);
-            time != nullptr && isMoment(*node.info, field.index))
-            *time += seconds;
-}
 
 Result<Scene> composeScene(const std::vector<CommandFrame>& frames, std::uint64_t until) {
     SceneInTime moments(frames);

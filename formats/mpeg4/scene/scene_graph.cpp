@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstring>
+#include <set>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -101,6 +102,13 @@ bool sameBits(const std::vector<T>& a, const std::vector<T>& b) {
 
 namespace {
 
+void walkAll(const std::vector<CommandFrame>& frames, const Visit& visit) {
+    Walk walk(visit);
+    for (const CommandFrame& frame : frames)
+        for (const Command& command : frame.commands)
+            eachRoot(command, [&](const NodePtr& root) { walk.from(root); });
+}
+
 Visit andAllBelow(const VisitAll& visit) {
     return [&visit](const NodePtr& node) {
         visit(node);
@@ -120,16 +128,16 @@ void forEachNode(const Command& command, const VisitAll& visit) {
 }
 
 void forEachNode(const std::vector<CommandFrame>& frames, const VisitAll& visit) {
-    const Visit each = andAllBelow(visit);
-    Walk walk(each);
-    for (const CommandFrame& frame : frames)
-        for (const Command& command : frame.commands)
-            eachRoot(command, [&](const NodePtr& root) { walk.from(root); });
+    walkAll(frames, andAllBelow(visit));
 }
 
 void walkNodes(const Command& command, const Visit& visit) {
     Walk walk(visit);
     eachRoot(command, [&](const NodePtr& root) { walk.from(root); });
+}
+
+void walkNodes(const NodePtr& root, const Visit& visit) {
+    Walk(visit).from(root);
 }
 
 bool sameValue(const FieldValue& a, const FieldValue& b) {
@@ -209,21 +217,190 @@ std::unordered_map<const Node*, NodePtr> copiesOf(const NodePtr& root) {
 
 }  // namespace
 
-NodePtr bodyOf(const Node& instance, std::size_t& copied) {
+namespace {
+
+/// Whether a field is of a kind, or, of an instance, gives one of that kind its value.
+template <class Is>
+bool isOrGives(const Node& node, int field, const Is& is) {
+    using Field = std::pair<const Node*, int>;
+    std::vector<Field> open{{&node, field}};
+    std::set<Field> seen;
+    while (!open.empty()) {
+        const auto [next, index] = open.back();
+        open.pop_back();
+        if (!next->proto) {
+            if (is(*next, next->info->fields[index])) return true;
+            continue;
+        }
+        for (const Proto::Link& link : next->proto->links)
+            if (link.protoField == index && seen.emplace(link.node.get(), link.field).second)
+                open.emplace_back(link.node.get(), link.field);
+    }
+    return false;
+}
+
+}  // namespace
+
+bool isMoment(const Node& node, int field) {
+    return node.info->fields[field].type == FieldType::SFTime &&
+           isOrGives(node, field, [](const Node&, const FieldInfo& info) {
+               return info.name == "startTime" || info.name == "stopTime";
+           });
+}
+
+bool isLoop(const Node& node, int field) {
+    return node.info->fields[field].type == FieldType::SFBool &&
+           isOrGives(node, field,
+                     [](const Node&, const FieldInfo& info) { return info.name == "loop"; });
+}
+
+bool isOfMedia(const Node& node, int field) {
+    return isOrGives(node, field,
+                     [](const Node& n, const FieldInfo&) { return n.info->find("url") >= 0; });
+}
+
+void forEachNodeOf(const Proto& proto, const VisitAll& visit) {
+    std::vector<const Proto*> open{&proto};
+    std::unordered_set<const Proto*> seen{&proto};
+    while (!open.empty()) {
+        const Proto& next = *open.back();
+        open.pop_back();
+        for (const NodePtr& node : next.body)
+            forEachNode(node, [&](const NodePtr& inside) {
+                visit(inside);
+                if (inside->proto && seen.insert(inside->proto.get()).second)
+                    open.push_back(inside->proto.get());
+            });
+    }
+}
+
+void shiftTimes(Node& node, double seconds) {
+    if (seconds == 0) return;
+    for (std::size_t i = 0; i < node.info->fields.size(); ++i) {
+        const int field = static_cast<int>(i);
+        if (isMoment(node, field) && node.info->fields[i].hasValue())
+            std::get<double>(node.edit(field)) += seconds;
+    }
+    if (node.proto) node.begin = seconds;
+}
+
+NodeList bodyOf(const Node& instance, std::size_t& copied) {
     copied = 0;
-    if (!instance.proto || instance.proto->body.empty()) return nullptr;
+    if (!instance.proto) return {};
     const Proto& proto = *instance.proto;
     const NodePtr holder = makeNode("Group");
     holder->set("children", proto.body);
     const auto copies = copiesOf(holder);
     copied = copies.size();
+    for (const auto& [original, copy] : copies) {
+        shiftTimes(*copy, instance.begin);
+        copy->loopedUntil = instance.loopedUntil;
+    }
     for (const Proto::Link& link : proto.links) {
         const auto found = copies.find(link.node.get());
         // A field of an event has no value to give.
         if (found != copies.end())
             (void)found->second->set(link.field, instance.value(link.protoField));
     }
-    return copies.at(proto.body.front().get());
+    return copies.at(holder.get())->get<NodeList>("children");
+}
+
+namespace {
+
+/// Nodes that are visited in the instances of PROTOs in all commands.
+constexpr std::int64_t kMostInBodies = 1 << 21;
+
+/// What an instance shows, which may be that of another one. The budget is below 0 where that does
+/// not end.
+NodePtr shownOf(const NodePtr& instance, std::int64_t& budget, NodeList& instances) {
+    NodePtr shown = instance;
+    while (shown && shown->proto && budget >= 0) {
+        instances.push_back(shown);
+        std::size_t copied = 0;
+        const NodeList body = bodyOf(*shown, copied);
+        budget -= static_cast<std::int64_t>(copied) + 1;
+        shown = body.empty() ? nullptr : body.front();
+    }
+    return shown;
+}
+
+/// The nodes from which one of `below` can be reached.
+std::unordered_set<const Node*> nodesAbove(const NodePtr& root, const NodeList& below) {
+    std::unordered_map<const Node*, std::vector<const Node*>> parents;
+    forEachNode(root, [&](const NodePtr& node) {
+        eachChild(*node, [&](const NodePtr& child) { parents[child.get()].push_back(node.get()); });
+    });
+    std::vector<const Node*> open;
+    for (const NodePtr& node : below) open.push_back(node.get());
+    std::unordered_set<const Node*> above;
+    while (!open.empty()) {
+        const Node* node = open.back();
+        open.pop_back();
+        for (const Node* parent : parents[node])
+            if (above.insert(parent).second) open.push_back(parent);
+    }
+    return above;
+}
+
+}  // namespace
+
+NodePtr withoutInstances(NodePtr root, std::int64_t& budget, NodeList& instances) {
+    if (root && root->proto) root = shownOf(root, budget, instances);
+    // What an instance shows may have others in it.
+    for (;;) {
+        NodeList found;
+        forEachNode(root, [&](const NodePtr& node) {
+            --budget;
+            if (node->proto) found.push_back(node);
+        });
+        if (budget < 0) return nullptr;
+        if (found.empty()) return root;
+        std::unordered_map<const Node*, NodePtr> inPlace;
+        for (const NodePtr& node : found)
+            inPlace.emplace(node.get(), shownOf(node, budget, instances));
+        std::vector<NodePtr> copies;
+        const auto above = nodesAbove(root, found);
+        forEachNode(root, [&](const NodePtr& node) {
+            if (node->proto || !above.contains(node.get())) return;
+            inPlace.emplace(node.get(), copies.emplace_back(std::make_shared<Node>(*node)));
+        });
+        const auto exchange = [&](NodePtr& node) {
+            if (const auto other = inPlace.find(node.get()); other != inPlace.end())
+                node = other->second;
+        };
+        for (const NodePtr& copy : copies)
+            for (Node::SetField& field : copy->setFields) {
+                if (NodePtr* child = std::get_if<NodePtr>(&field.value)) exchange(*child);
+                if (NodeList* list = std::get_if<NodeList>(&field.value)) {
+                    for (NodePtr& child : *list) exchange(child);
+                    std::erase(*list, nullptr);
+                }
+            }
+        exchange(root);
+    }
+}
+
+bool forEachNodeInside(const std::vector<CommandFrame>& frames, const VisitAll& visit) {
+    std::int64_t budget = kMostInBodies;
+    NodeList instances;
+    const Visit each = [&](const NodePtr& node) {
+        if (node->proto)
+            instances.push_back(node);
+        else
+            visit(node);
+        return !node->proto;
+    };
+    walkAll(frames, each);
+    const Visit eachInBody = [&](const NodePtr& node) { return --budget >= 0 && each(node); };
+    while (!instances.empty() && budget >= 0) {
+        const NodePtr instance = std::move(instances.back());
+        instances.pop_back();
+        std::size_t copied = 0;
+        const NodeList body = bodyOf(*instance, copied);
+        Walk walk(eachInBody);
+        for (const NodePtr& node : body) walk.from(node);
+    }
+    return budget >= 0;
 }
 
 namespace {

@@ -84,6 +84,26 @@ class Place {
     std::optional<glm::dquat> turn_;
 };
 
+/// A node that is where its type may not be; empty where there is none. Any node may be given to a
+/// PROTO, and be the first in one.
+std::string misfitIn(const NodePtr& root) {
+    std::string found;
+    forEachNode(root, [&](const NodePtr& parent) {
+        for (const Node::SetField& field : parent->setFields) {
+            const FieldInfo& info = parent->info->fields[field.index];
+            const auto check = [&](const NodePtr& child) {
+                if (!mayStandIn(child.get(), info.nodeType))
+                    found = fmt::format("{} into {}.{}", child->info->name, parent->info->name,
+                                        info.name);
+            };
+            if (const NodePtr* node = std::get_if<NodePtr>(&field.value)) check(*node);
+            if (const NodeList* list = std::get_if<NodeList>(&field.value))
+                for (const NodePtr& node : *list) check(node);
+        }
+    });
+    return found;
+}
+
 class Walker {
   public:
     Walker(const Limits& limits, ShownScene& scene) : limits_(limits), scene_(scene) {}
@@ -96,35 +116,59 @@ class Walker {
         return done;
     }
 
+    /// Finds the Switches that settle what is shown: those that have something in them that counts,
+    /// or of which nothing was said.
+    void settleChoices() {
+        std::unordered_set<const Node*> idle;
+        for (const NodePtr& choice : choices_) {
+            if (scene_.settledBy.contains(choice.get())) continue;
+            bool counts = false;
+            NodeList inside;
+            walkNodes(choice, [&](const NodePtr& node) {
+                if (counts || idle.contains(node.get())) return false;
+                inside.push_back(node);
+                counts = node->proto || isNews(*node);
+                return isEntered(typeOf(*node->info).role);
+            });
+            if (counts) scene_.settledBy.insert(choice.get());
+            if (!counts)
+                for (const NodePtr& node : inside) idle.insert(node.get());
+        }
+    }
+
   private:
+    /// Whether a node of this role may have others in it that are shown.
+    static bool isEntered(Role role) {
+        return role == Role::choice || role == Role::levels || role == Role::transform ||
+               role == Role::group || role == Role::otherGroup;
+    }
     Result<void> visitNode(const NodePtr& node, Place& place, int parent, int depth) {
         // A few nodes that USE each other in turn can be shown in any number of places.
-        if (++visits_ > kMaxVisits)
-            return fail(ErrorCode::invalidInput,
-                        "the scene shows more than {} nodes, counting each USE; that is not read",
-                        kMaxVisits);
+        --visitsLeft_;
+        STX_CHECK(checkVisits());
         if (depth > limits_.maxNesting)
             return fail(ErrorCode::invalidInput, "nodes nest deeper than {}", limits_.maxNesting);
         const std::string& type = node->info->name;
         if (node->proto) {
-            scene_.settledBy.insert(node.get());
-            if (holdsClock(*node->proto)) scene_.withClocks.insert(type);
+            noteInstance(*node);
             std::size_t copied = 0;
-            const NodePtr body = bodyOf(*node, copied);
-            visits_ += static_cast<std::int64_t>(copied);
-            if (body) return visit(body, place, parent, depth + 1);
+            const NodeList body = bodyOf(*node, copied);
+            visitsLeft_ -= static_cast<std::int64_t>(copied);
+            if (!body.empty()) return visit(body.front(), place, parent, depth + 1);
             scene_.leftOut.insert(type);
             return {};
         }
         const Type& known = typeOf(*node->info);
         switch (known.role) {
-            case Role::view:
+            case Role::view: {
                 if (scene_.nodes.size() >= static_cast<std::size_t>(limits_.maxViews))
                     return fail(ErrorCode::invalidInput, "the scene shows more than {} views",
                                 limits_.maxViews);
-                scene_.nodes.push_back({node, place.worldFromLocal(), parent});
+                STX_TRY(const NodePtr view, asShown(node));
+                scene_.nodes.push_back({view, place.worldFromLocal(), parent});
                 scene_.above.insert(path_.begin(), path_.end());
                 return {};
+            }
             case Role::background:
                 scene_.backgrounds.push_back({node, place.turn()});
                 scene_.settledBy.insert(path_.begin(), path_.end());
@@ -138,7 +182,7 @@ class Walker {
                 return {};
             }
             case Role::choice: {
-                scene_.settledBy.insert(node.get());
+                choices_.push_back(node);
                 const auto& choice = node->get<NodeList>("choice");
                 const auto chosen = node->get<std::int32_t>("whichChoice");
                 if (chosen < 0 || static_cast<std::size_t>(chosen) >= choice.size()) return {};
@@ -160,13 +204,73 @@ class Walker {
             case Role::setting:
                 return {};
             case Role::shape:
-                if (const NodePtr& geometry = node->get<NodePtr>("geometry"))
-                    scene_.leftOut.insert(geometry->info->name);
-                [[fallthrough]];
             case Role::other:
-                scene_.leftOut.insert(type);
+                forEachLeftOut(*node,
+                               [&](const std::string& name) { scene_.leftOut.insert(name); });
         }
         return {};
+    }
+
+    /// What is said of a node that is no view: its type, and that of what a Shape has.
+    template <class Take>
+    static void forEachLeftOut(const Node& node, const Take& take) {
+        take(node.info->name);
+        const NodePtr* geometry = node.is("Shape") ? &node.get<NodePtr>("geometry") : nullptr;
+        if (geometry != nullptr && *geometry) take((*geometry)->info->name);
+    }
+
+    [[nodiscard]] Result<void> checkVisits() const {
+        if (visitsLeft_ >= 0) return {};
+        return fail(ErrorCode::invalidInput,
+                    "the scene shows more than {} nodes, counting each USE; that is not read",
+                    kMaxVisits);
+    }
+
+    void noteInstance(const Node& instance) {
+        scene_.settledBy.insert(&instance);
+        if (holdsClock(*instance.proto)) scene_.withClocks.insert(instance.info->name);
+    }
+
+    /// A view with what it shows in place of instances of PROTOs in it.
+    Result<NodePtr> asShown(const NodePtr& node) {
+        const auto [entry, fresh] = shown_.try_emplace(node);
+        if (!fresh) return entry->second;
+        NodeList instances;
+        NodePtr view = withoutInstances(node, visitsLeft_, instances);
+        STX_CHECK(checkVisits());
+        for (const NodePtr& instance : instances) {
+            noteInstance(*instance);
+            if (instance->proto->body.empty()) scene_.leftOut.insert(instance->info->name);
+        }
+        const bool ofProto =
+            !instances.empty() ||
+            std::ranges::any_of(path_, [](const Node* above) { return above->proto != nullptr; });
+        if (const std::string wrong = ofProto ? misfitIn(view) : ""; !wrong.empty())
+            return fail(ErrorCode::invalidInput,
+                        "a PROTO brings {}, where it is not allowed; put another node there",
+                        wrong);
+        entry->second = view;
+        return view;
+    }
+
+    /// Whether it would say or show something that the scene does not yet.
+    bool isNews(const Node& node) {
+        switch (typeOf(*node.info).role) {
+            case Role::view:
+            case Role::background:
+            case Role::info:
+                return true;
+            case Role::shape:
+            case Role::other: {
+                bool news = false;
+                forEachLeftOut(node, [&](const std::string& name) {
+                    news = news || !scene_.leftOut.contains(name);
+                });
+                return news;
+            }
+            default:
+                return false;
+        }
     }
 
     /// Whether a TimeSensor is in a PROTO or in those that it uses.
@@ -174,19 +278,10 @@ class Walker {
         const auto known = clocks_.try_emplace(&proto, false);
         bool& holds = known.first->second;
         if (!known.second) return holds;
-        std::vector<const Proto*> open{&proto};
-        std::unordered_set<const Proto*> seen{&proto};
-        while (!open.empty()) {
-            const Proto& next = *open.back();
-            open.pop_back();
-            for (const NodePtr& node : next.body)
-                forEachNode(node, [&](const NodePtr& inside) {
-                    ++visits_;
-                    if (inside->is("TimeSensor")) holds = true;
-                    if (inside->proto && seen.insert(inside->proto.get()).second)
-                        open.push_back(inside->proto.get());
-                });
-        }
+        forEachNodeOf(proto, [&](const NodePtr& inside) {
+            --visitsLeft_;
+            if (inside->is("TimeSensor")) holds = true;
+        });
         return holds;
     }
 
@@ -220,7 +315,9 @@ class Walker {
     const Limits& limits_;
     ShownScene& scene_;
     std::vector<const Node*> path_;  ///< from the root to the node that is visited
-    std::int64_t visits_ = 0;
+    std::int64_t visitsLeft_ = kMaxVisits;
+    std::unordered_map<NodePtr, NodePtr> shown_;  ///< of views; their addresses are not used again
+    NodeList choices_;                            ///< Switches
     std::unordered_map<const Proto*, bool> clocks_;  ///< whether one is inside
     std::unordered_map<const NodeInfo*, Type> types_;
     int groups_ = 0;
@@ -231,7 +328,9 @@ class Walker {
 Result<ShownScene> shownScene(const NodePtr& root, const Limits& limits) {
     ShownScene scene;
     Place world;
-    STX_CHECK(Walker(limits, scene).visit(root, world, 0, 1));
+    Walker walker(limits, scene);
+    STX_CHECK(walker.visit(root, world, 0, 1));
+    walker.settleChoices();
     return scene;
 }
 

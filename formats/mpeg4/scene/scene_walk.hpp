@@ -12,7 +12,9 @@ namespace stx::mpeg4 {
 
 /// A DepthImage or OctreeImage that is shown, and where.
 struct ShownNode {
-    NodePtr node;                    ///< DepthImage, DepthImageV2 or OctreeImage
+    /// DepthImage, DepthImageV2 or OctreeImage, with no instance of a PROTO in it; a copy where
+    /// there is one.
+    NodePtr node;
     glm::dmat4 worldFromLocal{1.0};  ///< of all Transforms above it
     int parent = 0;                  ///< the same for nodes under the very same grouping node's use
 };
@@ -41,7 +43,7 @@ struct ShownScene {
     std::vector<ShownBackground> backgrounds;
     std::unordered_set<const Node*> above;  ///< the nodes that one of `nodes` is in
     /// Other nodes whose fields say what is shown and where: those that a WorldInfo or Background
-    /// is in, Switches, instances of PROTOs.
+    /// is in, instances of PROTOs, and Switches that have such or views in them.
     std::unordered_set<const Node*> settledBy;
     std::set<std::string> leftOut;  ///< types of nodes that are no views, groups or settings
     /// Types of grouping nodes that turn, move or choose their children; read as plain groups.

@@ -295,7 +295,7 @@ TEST(ExtendedCommands, DeclareProtosForLaterOnes) {
     const NodePtr instance = child(shown(unit.in(), 1000), 1);
     ASSERT_TRUE(instance->proto);
     std::size_t copied = 0;
-    EXPECT_EQ(bodyOf(*instance, copied)->get<float>("intensity"), 0.5f);
+    EXPECT_EQ(bodyOf(*instance, copied).front()->get<float>("intensity"), 0.5f);
 }
 
 TEST(ExtendedCommands, ThatAreBrokenAreCarried) {

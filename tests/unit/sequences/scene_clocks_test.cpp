@@ -266,8 +266,8 @@ AT 2000 { DELETE V }
     EXPECT_EQ(line->times, (std::vector<double>{0, 0.5, 1, 1.5, 2}));
 }
 
-TEST(SceneClocks, RunOnWherePicturesHaveEnded) {
-    // While pictures run, theirs are the moments.
+TEST(SceneClocks, RunBetweenPicturesAndOn) {
+    // A picture less than a step away shows what has moved, too.
     Document document = moved("cycleInterval 4", "", R"(
 DepthImage { orthographic FALSE diTexture SimpleTexture { depth PixelTexture { image 1 1 1 200 }
     texture MovieTexture { url [od:10] } } } )");
@@ -275,8 +275,175 @@ DepthImage { orthographic FALSE diTexture SimpleTexture { depth PixelTexture { i
     const auto sequence = opened(document);
     ASSERT_TRUE(sequence);
     const Timeline& line = sequence->timeline();
-    EXPECT_EQ(line.count(), 6u + 26u);
+    EXPECT_EQ(line.count(), 101u - 6u + 3u) << "three pictures are between two steps";
     EXPECT_NEAR(line.times.back(), 4, 1e-9);
+    for (std::size_t i = 1; i < line.count(); ++i)
+        EXPECT_LT(line.times[i] - line.times[i - 1], 0.0601) << line.times[i];
+}
+
+TEST(SceneClocks, SendOneAtTheEndOfEachCycle) {
+    expectPlaces(moved("cycleInterval 1 loop TRUE stopTime 2.5"),
+                 {{0, 0}, {.96, 3.84}, {1, 4}, {1.04, .16}, {2, 4}, {2.04, .16}, {2.52, 2}});
+    // Doubles of the times may be beside it.
+    expectPlaces(moved("cycleInterval 0.2 loop TRUE startTime 1.1 stopTime 2.1"),
+                 {{1.1, 0}, {1.3, 4}, {1.5, 4}, {1.7, 4}, {1.9, 4}, {2.1, 4}}, 1e-3);
+}
+
+TEST(SceneClocks, EndTheirCycleWhenTheyLoopNoMore) {
+    const std::string off = "AT 2500 { REPLACE TS.loop BY FALSE }";
+    expectPlaces(moved("cycleInterval 1 loop TRUE", off),
+                 {{2.48, 1.92}, {2.5, 2}, {2.52, 2.08}, {2.96, 3.84}, {3, 4}});
+    EXPECT_NEAR(opened(moved("cycleInterval 1 loop TRUE", off))->timeline().times.back(), 3, 1e-9);
+    // Where they stop before, and where they begin after it.
+    expectPlaces(moved("cycleInterval 1 loop TRUE stopTime 2.75", off), {{2.72, 2.88}, {2.76, 3}});
+    expectPlaces(moved("cycleInterval 1 loop TRUE startTime 4", off), {{4.48, 1.92}, {5, 4}});
+    // At a cycle's end, of which doubles are off; and anew by a later start.
+    expectPlaces(
+        moved("cycleInterval 0.1 loop TRUE",
+              "AT 1100 { REPLACE TS.loop BY FALSE } AT 2000 { REPLACE TS.startTime BY 0 }"),
+        {{1.1, 4}, {1.9, 4}, {2, 0}, {2.04, 1.6}, {2.12, 4}});
+    // Of one that loops again, the next end counts.
+    expectPlaces(moved("cycleInterval 1 loop TRUE", off + " AT 2700 { REPLACE TS.loop BY TRUE } "
+                                                          "AT 3500 { REPLACE TS.loop BY FALSE }"),
+                 {{2.62, 2.4}, {3.22, .8}, {3.5, 2}, {4, 4}});
+    expectPictures(film("loop TRUE", "AT 4200 { REPLACE MT.loop BY FALSE }"),
+                   {{3.1, 0}, {4.1, 2}, {4.6, 3}, {5.6, 5}, {6.1, 5}});
+    // One that stops at the end of a cycle shows its last picture from then on.
+    expectPictures(film("loop TRUE stopTime 3", "AT 4000 { REPLACE TR.rotation BY 0 0 1 0.1 }"),
+                   {{2.6, 5}, {3.1, 5}, {4.1, 5}});
+}
+
+TEST(SceneClocks, CountFromTheAccessUnitThatBringsThem) {
+    for (const char* start : {"", "startTime 0"}) {
+        const std::string clock =
+            "DEF T2 TimeSensor { cycleInterval 2 " + std::string(start) + " }";
+        expectPlaces(moved("enabled FALSE",
+                           "AT 1000 { APPEND TO G.children " + clock +
+                               " INSERT ROUTE T2.fraction_changed TO "
+                               "PI.set_fraction }",
+                           "DEF G Group { }"),
+                     {{0, -1}, {1, 0}, {2, 2}, {3, 4}});
+    }
+    // The movies in a PROTO, too, by themselves and by its fields.
+    for (const char* start : {"startTime 0", "", "startTime IS begin"}) {
+        Document document = readText(std::string(R"(
+PROTO V [ field SFTime begin 0 ] { DepthImage { orthographic FALSE position 0 0 0
+    diTexture SimpleTexture { depth PixelTexture { image 1 1 1 200 }
+        texture MovieTexture { url [od:10] )") +
+                                     start + R"( } } } }
+DEF G Group { children [ DepthImage { orthographic FALSE diTexture SimpleTexture {
+    depth PixelTexture { image 1 1 1 200 } texture PixelTexture { image 1 1 3 0 } } } ] }
+AT 1000 { REPLACE G.children[0] BY V { } }
+)");
+        addStream(document, 0, pictures({0, 40, 80, 120, 160, 200}));
+        expectPictures(document, {{.5, 0}, {1.1, 0}, {1.6, 1}, {2.1, 2}, {3.6, 5}});
+    }
+}
+
+TEST(SceneClocks, MoviesRunInPROTOs) {
+    const auto with = [](const std::string& protos, const std::string& view,
+                         const std::string& commands = "") {
+        Document document = readText(protos + "Group { children [ " + view + " ] }\n" + commands);
+        addStream(document, 0, pictures({0, 40, 80, 120, 160, 200}));
+        addStream(document, 0, pictures({200}));
+        std::get<UpdateObjectDescriptors>(document.odFrames[1].commands[0]).descriptors[0].id = 11;
+        return document;
+    };
+    const std::string depth = "depth PixelTexture { image 1 1 1 200 }";
+    const std::string place = "orthographic FALSE position 0 0 0 ";
+    const std::string simple =
+        "SimpleTexture { " + depth + " texture MovieTexture { url [od:10] } }";
+    const std::string view = "DepthImage { " + place + "diTexture " + simple + " }";
+    const Shown shown = {{.1, 0}, {.6, 1}, {1.1, 2}, {2.6, 5}};
+    expectPictures(with("PROTO V [ ] { " + view + " }", "V { }"), shown);
+    expectPictures(with("PROTO V [ ] { " + view + " } PROTO W [ ] { V { } }", "W { }"), shown);
+    expectPictures(
+        with("PROTO T [ ] { " + simple + " }", "DepthImage { " + place + "diTexture T { } }"),
+        shown);
+    const std::string movie =
+        "PROTO M [ exposedField MFURL url [] ] { MovieTexture { url IS url } }";
+    const std::string ofMovie = "DepthImage { " + place + "diTexture SimpleTexture { " + depth +
+                                " texture DEF M M { url [od:10] } } }";
+    expectPictures(with(movie, ofMovie), shown);
+    expectPictures(with(movie, ofMovie, "AT 1000 { REPLACE M.url BY [od:11] }"),
+                   {{.6, 1}, {1.1, 5}, {2.6, 5}});
+    // A field of a PROTO may be called as one of a view.
+    expectPictures(with("PROTO V [ field SFInt32 diTexture 3 ] { " + view + " }", "V { }"), shown);
+}
+
+TEST(SceneClocks, ViewsRefuseWhatMayNotBeThere) {
+    const auto errorOf = [](const std::string& text) {
+        Job job;
+        const auto bundle = bundleFromScene(readText(text), {}, job);
+        return bundle ? std::string() : bundle.error().text();
+    };
+    const std::string wrong =
+        "a PROTO brings Group into DepthImage.diTexture, where it is not allowed; put another node "
+        "there";
+    EXPECT_EQ(
+        errorOf("PROTO T [ ] { Group { } } Group { children [ DepthImage { diTexture T { } } ] }"),
+        wrong);
+    EXPECT_EQ(errorOf("PROTO V [ field SFNode t NULL ] { DepthImage { diTexture IS t } } "
+                      "Group { children [ V { t Group { } } ] }"),
+              wrong);
+}
+
+TEST(SceneClocks, RoutesTakeWhatCommandsSend) {
+    const auto with = [](const std::string& routes, const std::string& command) {
+        return readText(R"(Group { children [ DEF TR Transform { children [
+DepthImage { orthographic FALSE position 0 0 0 diTexture SimpleTexture {
+    depth PixelTexture { image 1 1 1 200 } } } ] } DEF B Transform { } DEF C Transform { }
+DEF V Valuator { } DEF N Conditional { }
+DEF PI PositionInterpolator { key [0 1] keyValue [0 0 0, 4 0 0] } ] }
+)" + routes + " AT 1000 { " +
+                        command + " }");
+    };
+    expectPlaces(with("ROUTE PI.value_changed TO TR.translation", "REPLACE PI.set_fraction BY 0.5"),
+                 {{.5, 0}, {1, 2}});
+    expectPlaces(with("ROUTE B.translation TO TR.translation", "REPLACE B.translation BY 3 0 0"),
+                 {{.5, 0}, {1, 3}});
+    // In turn, in a circle, by a route that comes with it.
+    expectPlaces(with("ROUTE B.translation TO C.translation ROUTE C.translation TO B.translation "
+                      "ROUTE C.translation TO TR.translation",
+                      "REPLACE B.translation BY 3 0 0"),
+                 {{.5, 0}, {1, 3}});
+    expectPlaces(with("",
+                      "INSERT ROUTE B.translation TO TR.translation REPLACE B.translation BY "
+                      "3 0 0 REPLACE C.translation BY 1 0 0 INSERT ROUTE C.translation TO "
+                      "TR.translation REPLACE C.translation BY 5 0 0"),
+                 {{.5, 0}, {1, 5}});
+    const auto noteOf = [](Document document) {
+        Job job;
+        EXPECT_TRUE(sequenceFromScene(std::move(document), {}, job));
+        const auto notes = job.takeNotes();
+        return notes.empty() ? std::string() : notes.front();
+    };
+    const std::string start = "commands move nothing through these, which are not followed: ";
+    EXPECT_EQ(noteOf(with("", "REPLACE N.activate BY TRUE")), start + "Conditional.activate");
+    EXPECT_EQ(noteOf(with("ROUTE B.translation TO V.inSFVec3f", "REPLACE B.translation BY 1 0 0")),
+              start + "Transform.translation TO Valuator.inSFVec3f");
+    EXPECT_EQ(
+        noteOf(with("ROUTE B.translation TO TR.translation", "REPLACE B.translation BY 1 0 0")),
+        "");
+}
+
+TEST(SceneClocks, BrokenKeysAreNoted) {
+    const auto noteOf = [](const std::string& keys) {
+        Job job;
+        Document document =
+            moved("cycleInterval 4", "", "DEF P2 ScalarInterpolator { " + keys + " }");
+        EXPECT_TRUE(sequenceFromScene(std::move(document), {}, job));
+        const auto notes = job.takeNotes();
+        return notes.empty() ? std::string() : notes.front();
+    };
+    const std::string expected =
+        "; a key for each keyValue, in ascending order, is expected: what it moves may stand still "
+        "or jump";
+    EXPECT_EQ(noteOf("key [0 0.5 0.5 1] keyValue [1 2 3 4]"), "");
+    EXPECT_EQ(noteOf("key [0 1] keyValue [1 2 3]"),
+              "ScalarInterpolator 'P2' has 2 keys and 3 keyValues" + expected);
+    EXPECT_EQ(noteOf("key [0 0.5 0.2] keyValue [1 2 3]"),
+              "ScalarInterpolator 'P2' has the key 0.2 after 0.5" + expected);
 }
 
 TEST(SceneClocks, WhatTheyDoNotMoveIsNoted) {

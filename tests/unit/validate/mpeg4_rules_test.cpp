@@ -124,6 +124,15 @@ std::map<int, std::function<Document()>> brokenDocuments() {
         d.frames.push_back(
             {1, {DeleteIndexed{rootOf(d), rootOf(d)->info->find("children"), Position{77}}}});
     });
+    broken[2033] = [] {
+        Document document = sound();
+        const NodePtr interpolator = makeNode("ScalarInterpolator");
+        interpolator->set("key", std::vector<float>{0, 1});
+        std::get<ReplaceScene>(document.frames[0].commands[0])
+            .root->edit<NodeList>("children")
+            .push_back(interpolator);
+        return document;
+    };
     broken[2032] = [] {
         Job job;
         auto document = readBt(
