@@ -30,7 +30,7 @@ Result<Read> readPhoto(const std::filesystem::path& file) {
     out.distances = out.stored.depth;
     STX_CHECK(view.distances(out.distances,
                              view.camera.resized(out.distances.width(), out.distances.height()),
-                             out.stored.depthBits, job));
+                             out.stored.largest, job));
     return out;
 }
 
