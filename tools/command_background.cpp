@@ -98,14 +98,14 @@ Result<void> writeColour(const Rgba8Image& image, const std::string& path, Progr
         open += image.pixels()[i].a == 0;
     }
     FrameOptions options;
-    if (open == 0)
-        options.background = glm::vec3(0);  // written without alpha
-    else
-        program.job.note(
-            fmt::format("{} stay open: no frame shows anything there", counted(open, "pixel")));
+    if (open == 0) options.background = glm::vec3(0);  // written without alpha
     options.pngLevel = 6;
     options.noClobber = program.common.noClobber;
-    return writeFrame(frame, path, options);
+    STX_CHECK(writeFrame(frame, path, options));
+    if (open > 0)
+        program.job.note(
+            fmt::format("{} stay open: no frame shows anything there", counted(open, "pixel")));
+    return {};
 }
 
 Result<void> writeMasks(const std::vector<MaskTarget>& targets, const Rgba8Image& background,

@@ -42,7 +42,7 @@ bool loading = true;
     ::_exit(1);
 }
 
-/// Who asked is told why this process ends; nothing is said where the kernel kills it.
+/// Says to who asked why this process ends. Where the kernel kills it, nothing does.
 void sayWhyItEnds() {
     static char room[1 << 16];  // where the stack itself has run over
     const stack_t other = {room, 0, sizeof(room)};

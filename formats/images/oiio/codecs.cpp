@@ -153,9 +153,9 @@ double storedLargestOf(const OIIO::ImageSpec& spec, const std::string& format) {
     const int whole = static_cast<int>(8 * type.size());
     // Others mean bits of a pixel by this, or those of a palette's index.
     constexpr int kPalette = 3;
-    const bool told = (format == "tiff" || format == "jpeg2000" || format == "dpx") &&
+    const bool known = (format == "tiff" || format == "jpeg2000" || format == "dpx") &&
                       spec.get_int_attribute("tiff:PhotometricInterpretation") != kPalette;
-    const int bits = told ? spec.get_int_attribute("oiio:BitsPerSample", whole) : whole;
+    const int bits = known ? spec.get_int_attribute("oiio:BitsPerSample", whole) : whole;
     if (!type.is_signed() && bits == whole && whole <= 16) return 0;
     return std::ldexp(1.0, type.is_signed() ? bits - 1 : bits) - 1;
 }

@@ -89,8 +89,8 @@ std::uint64_t keptPictureBytes(const Limits& limits) {
 void noteBrokenKeys(const Document& document, Job& job) {
     for (const std::string& broken : brokenKeys(document.frames))
         job.note(broken +
-                 "; a key for each keyValue, in ascending order, is expected: what it moves may "
-                 "stand still or jump");
+                 "; a key for each keyValue, in ascending order, is expected: its motion may stop "
+                 "or jump");
 }
 
 Result<std::unique_ptr<Sequence>> sequenceFromScene(Document document,

@@ -74,7 +74,7 @@ Result<std::optional<std::string>> utf8FromXml(std::string_view xml, const std::
     if (const auto bad = findBadUtf8(text); bad != std::string_view::npos)
         return failAt(
             Lines(text).at(fileName, static_cast<std::ptrdiff_t>(bad)), ErrorCode::invalidInput,
-            "found the byte {:02X}, which is no UTF-8, and no other encoding is declared; "
+            "found the byte {:02X}, which is not UTF-8, and no other encoding is declared; "
             "where the text is ISO-8859-1, its first line must be <?xml "
             "version=\"1.0\" encoding=\"ISO-8859-1\"?>",
             static_cast<unsigned char>(text[bad]));

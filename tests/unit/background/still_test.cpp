@@ -92,7 +92,7 @@ TEST(StillBackground, SelectDoesNotTakeWhatHasLessNoiseForWhatStandsStill) {
     EXPECT_LT(backgroundErrors(right.colour, wall(kStillSize)).peps, 0.001);
     settings.adaptive = 0;
     const auto wrong = mustMakeStill(stillBackground(frames, settings, job));
-    EXPECT_GT(backgroundErrors(wrong.colour, wall(kStillSize)).peps, 0.05) << "no longer hard";
+    EXPECT_GT(backgroundErrors(wrong.colour, wall(kStillSize)).peps, 0.05) << "the scene is easy";
 }
 
 /// What was cut out of the frames has a colour that nobody sees.

@@ -437,8 +437,8 @@ TEST(SceneClocks, BrokenKeysAreNoted) {
         return notes.empty() ? std::string() : notes.front();
     };
     const std::string expected =
-        "; a key for each keyValue, in ascending order, is expected: what it moves may stand still "
-        "or jump";
+        "; a key for each keyValue, in ascending order, is expected: its motion may stop or "
+        "jump";
     EXPECT_EQ(noteOf("key [0 0.5 0.5 1] keyValue [1 2 3 4]"), "");
     EXPECT_EQ(noteOf("key [0 1] keyValue [1 2 3]"),
               "ScalarInterpolator 'P2' has 2 keys and 3 keyValues" + expected);
