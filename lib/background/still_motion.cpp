@@ -14,10 +14,13 @@ void LumaRows::take(const Rgba8Image& picture, int firstRow, int rowCount) {
     values.resize(static_cast<std::size_t>(rows) * width);
     seen.resize(values.size());
     const glm::u8vec4* from = picture.data() + static_cast<std::size_t>(first) * width;
+    std::uint8_t all = 1;
     for (std::size_t i = 0; i < values.size(); ++i) {
         values[i] = stillLuma(from[i]);
         seen[i] = isSeen(from[i]);
+        all &= seen[i];
     }
+    allSeen = all != 0;
 }
 
 MotionWindow::MotionWindow(int width, int height, int divisor, MotionScore score)
@@ -61,6 +64,7 @@ void MotionWindow::scores(const LumaRows& before, const LumaRows& now, int y,
         to[last] =
             static_cast<std::uint16_t>(std::abs(bBelow[last] - aBelow[last] - b[last] + a[last]));
     }
+    if (before.allSeen && now.allSeen) return;
     const std::uint8_t* aSeen = before.seenRow(y);
     const std::uint8_t* bSeen = now.seenRow(y);
     for (int x = 0; x < width_; ++x) {

@@ -13,6 +13,7 @@ struct LumaRows {
     int width = 0, first = 0, rows = 0;  ///< rows first .. first + rows - 1 of the picture
     std::vector<std::uint8_t> values;
     std::vector<std::uint8_t> seen;  ///< 0 or 1, where the picture shows something
+    bool allSeen = true;
 
     /// Takes them from a picture.
     void take(const Rgba8Image& picture, int firstRow, int rowCount);
