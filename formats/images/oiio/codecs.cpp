@@ -154,7 +154,7 @@ double storedLargestOf(const OIIO::ImageSpec& spec, const std::string& format) {
     // Others mean bits of a pixel by this, or those of a palette's index.
     constexpr int kPalette = 3;
     const bool known = (format == "tiff" || format == "jpeg2000" || format == "dpx") &&
-                      spec.get_int_attribute("tiff:PhotometricInterpretation") != kPalette;
+                       spec.get_int_attribute("tiff:PhotometricInterpretation") != kPalette;
     const int bits = known ? spec.get_int_attribute("oiio:BitsPerSample", whole) : whole;
     if (!type.is_signed() && bits == whole && whole <= 16) return 0;
     return std::ldexp(1.0, type.is_signed() ? bits - 1 : bits) - 1;
