@@ -67,6 +67,13 @@ std::optional<Bytes> utf8FromMarked(ByteSpan text) {
     return out;
 }
 
+Bytes utf8FromLatin1(ByteSpan text) {
+    Bytes out;
+    out.reserve(text.size());
+    for (const std::byte byte : text) append(out, std::to_integer<std::uint32_t>(byte));
+    return out;
+}
+
 std::string_view trimmed(std::string_view text) {
     constexpr std::string_view blanks = " \t\r\n\v\f";
     const auto first = text.find_first_not_of(blanks);

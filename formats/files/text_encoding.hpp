@@ -11,6 +11,9 @@ namespace stx {
 /// order), the mark removed; nothing when it has none. Broken surrogates become U+FFFD.
 [[nodiscard]] std::optional<Bytes> utf8FromMarked(ByteSpan text);
 
+/// The same of text in ISO-8859-1.
+[[nodiscard]] Bytes utf8FromLatin1(ByteSpan text);
+
 /// Without the blanks of ASCII at both ends.
 [[nodiscard]] std::string_view trimmed(std::string_view text);
 

@@ -10,6 +10,7 @@
 #include "formats/files/byte_io.hpp"
 #include "formats/images/images.hpp"
 #include "formats/images/tiff_numbers.hpp"
+#include "formats/images/webp_chunks.hpp"
 
 namespace stx {
 namespace {
@@ -84,16 +85,14 @@ ByteSpan exifIn(ByteSpan file) {
             if (hasText(file, at + 4, "eXIf")) return file.subspan(at + 8, size);
             at += 12 + size;
         }
-    } else if (hasText(file, 0, "RIFF") && hasText(file, 8, "WEBP")) {
-        for (std::size_t at = 12; at + 8 <= file.size();) {
-            const std::size_t size = __builtin_bswap32(bigEndian(file, at + 4, 4));
-            if (file.size() - at - 8 < size) return {};
+    } else if (isWebp(file)) {
+        ByteSpan exif;
+        eachWebpChunk(file, "EXIF", [&](ByteSpan body) {
             // Some write the header of a JPEG's, too.
-            const std::size_t skip = hasText(file, at + 8, kHeader) ? kHeader.size() : 0;
-            if (hasText(file, at, "EXIF") && size > skip)
-                return file.subspan(at + 8 + skip, size - skip);
-            at += 8 + size + size % 2;
-        }
+            exif = hasText(body, 0, kHeader) ? body.subspan(kHeader.size()) : body;
+            return !exif.empty();
+        });
+        return exif;
     }
     return {};
 }

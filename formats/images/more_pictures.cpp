@@ -4,6 +4,7 @@
 
 #include "formats/files/byte_io.hpp"
 #include "formats/images/tiff_numbers.hpp"
+#include "formats/images/webp_chunks.hpp"
 
 namespace stx {
 namespace {
@@ -52,16 +53,11 @@ bool gifHasMore(ByteSpan file) {
     return false;
 }
 
-/// RIFF's chunks of an animation's frames.
+/// An animation has its frames in chunks.
 bool webpHasMore(ByteSpan file) {
     int frames = 0;
-    for (std::size_t at = 12; at + 8 <= file.size();) {
-        if (hasText(file, at, "ANMF") && ++frames > 1) return true;
-        const std::size_t size = byteOf(file, at + 4) | byteOf(file, at + 5) << 8 |
-                                 byteOf(file, at + 6) << 16 | byteOf(file, at + 7) << 24;
-        at += 8 + size + size % 2;
-    }
-    return false;
+    eachWebpChunk(file, "ANMF", [&](ByteSpan) { return ++frames > 1; });
+    return frames > 1;
 }
 
 /// acTL, which is before the pixels, has the number of frames.
@@ -79,7 +75,7 @@ bool pngHasMore(ByteSpan file) {
 bool holdsMorePictures(ByteSpan file) {
     if (const TiffLayout* layout = tiffLayoutOf(file)) return tiffHasMore(file, *layout);
     if (hasText(file, 0, "GIF8")) return gifHasMore(file);
-    if (hasText(file, 0, "RIFF") && hasText(file, 8, "WEBP")) return webpHasMore(file);
+    if (isWebp(file)) return webpHasMore(file);
     return hasText(file, 0, "\x89PNG\r\n\x1a\n") && pngHasMore(file);
 }
 

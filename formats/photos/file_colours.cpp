@@ -10,6 +10,7 @@
 
 #include "formats/images/exif.hpp"
 #include "formats/images/tiff_numbers.hpp"
+#include "formats/images/webp_chunks.hpp"
 #include "formats/photos/colour_profile.hpp"
 #include "formats/photos/jpeg_segments.hpp"
 #include "formats/photos/numbers.hpp"
@@ -172,16 +173,13 @@ FileColours coloursOfPng(ByteSpan file) {
     return madeOf(points, curve);
 }
 
-/// RIFF's chunk `ICCP` (WebP container specification).
 Bytes profileOfWebp(ByteSpan file) {
-    for (std::size_t at = 12; at + 8 <= file.size();) {
-        const std::size_t size = littleEndian(file, at + 4, 4);
-        if (file.size() - at - 8 < size) break;
-        const ByteSpan body = file.subspan(at + 8, size);
-        if (textIn(file.subspan(at, 4)) == "ICCP") return {body.begin(), body.end()};
-        at += 8 + size + size % 2;
-    }
-    return {};
+    Bytes profile;
+    eachWebpChunk(file, "ICCP", [&](ByteSpan body) {
+        profile.assign(body.begin(), body.end());
+        return true;
+    });
+    return profile;
 }
 
 /// Tag 34675 of the first directory (ICC.1:2022, annex B.4).
@@ -203,8 +201,7 @@ Bytes profileOfTiff(ByteSpan file) {
 FileColours coloursOf(ByteSpan file) {
     if (isJpeg(file)) return {readJpegSegments(file).profile, {}};
     if (beginsWith(file, "\x89PNG\r\n\x1a\n"sv)) return coloursOfPng(file);
-    if (beginsWith(file, "RIFF"sv) && file.size() >= 12 && textIn(file.subspan(8, 4)) == "WEBP")
-        return {profileOfWebp(file), {}};
+    if (isWebp(file)) return {profileOfWebp(file), {}};
     return {profileOfTiff(file), {}};
 }
 

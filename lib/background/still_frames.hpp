@@ -10,6 +10,7 @@
 #include <glm/glm.hpp>
 
 #include "lib/base/job.hpp"
+#include "lib/model/is_seen.hpp"
 #include "lib/model/texture.hpp"
 
 namespace stx {
@@ -56,11 +57,6 @@ inline constexpr std::uint64_t kFrameBytesPerPixel = 8;
 [[nodiscard]] Result<void> takeFrames(
     StillFrames& frames, std::span<const int> which, std::uint64_t bytes,
     const std::function<void(std::size_t, const Rgba8Image&)>& take);
-
-/// Whether a pixel shows more of what was filmed than it hides. What was cut out is not looked at.
-[[nodiscard]] inline bool isSeen(glm::u8vec4 p) {
-    return p.a >= 128;
-}
 
 /// Luma of BT.601, 0..255: what every method here sees of a frame.
 [[nodiscard]] inline std::uint8_t stillLuma(glm::u8vec4 p) {

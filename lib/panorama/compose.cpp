@@ -42,8 +42,11 @@ class Drawn {
                              less > 1 ? std::max(1, std::max(camera.size.x, camera.size.y) / less)
                                       : std::max(camera.size.x, camera.size.y));
         const auto pixels = copy_.colour.pixels();
-        opaque_ =
-            std::all_of(pixels.begin(), pixels.end(), [](glm::u8vec4 p) { return p.a == 255; });
+        if (!std::ranges::all_of(pixels, [](glm::u8vec4 p) { return p.a == 255; })) {
+            shown_ = Image<float>(copy_.colour.width(), copy_.colour.height());
+            std::ranges::transform(pixels, shown_.pixels().begin(),
+                                   [](glm::u8vec4 p) { return static_cast<float>(p.a) / 255.0f; });
+        }
         scale = std::max(1.0, scale * copy_.colour.width() / camera.size.x);
         wide_ = scale > kWidenedFrom ? static_cast<float>(scale) : 1.0f;
         worldFromCamera_ = glm::mat3_cast(camera.worldFromCamera);
@@ -64,7 +67,7 @@ class Drawn {
         const double edge = std::min({x, y, width - x, height - y});
         if (edge <= -0.5) return 0;
         const auto covered = static_cast<float>(std::min(1.0, edge + 0.5));
-        return opaque_ ? covered : covered * shown(x, y);
+        return shown_.empty() ? covered : covered * sampleLinear(shown_, x, y);
     }
     /// The square of a position's distance from the middle, halves of the diagonal.
     [[nodiscard]] double radius2(double x, double y) const {
@@ -81,20 +84,6 @@ class Drawn {
     }
 
   private:
-    /// Alpha between pixels, 0..1.
-    [[nodiscard]] float shown(double x, double y) const {
-        const auto at = [](double p, int size) { return std::clamp(p - 0.5, 0.0, size - 1.0); };
-        const double px = at(x, copy_.colour.width()), py = at(y, copy_.colour.height());
-        const int x0 = static_cast<int>(px), y0 = static_cast<int>(py);
-        const int x1 = std::min(x0 + 1, copy_.colour.width() - 1);
-        const int y1 = std::min(y0 + 1, copy_.colour.height() - 1);
-        const auto tx = static_cast<float>(px - x0), ty = static_cast<float>(py - y0);
-        const auto alpha = [&](int column, int row) {
-            return static_cast<float>(copy_.colour.at(column, row).a) / 255.0f;
-        };
-        return glm::mix(glm::mix(alpha(x0, y0), alpha(x1, y0), tx),
-                        glm::mix(alpha(x0, y1), alpha(x1, y1), tx), ty);
-    }
     /// Catmull and Rom's kernel.
     static float cubic(float t) {
         t = std::abs(t);
@@ -127,7 +116,7 @@ class Drawn {
     TurnLens lens_;
     glm::dmat3 worldFromCamera_{1.0};
     float wide_ = 1;
-    bool opaque_ = true;
+    Image<float> shown_;  ///< alpha, 0..1; empty: 1
 };
 
 /// Pixels of one row that show a picture.

@@ -109,18 +109,18 @@ std::vector<std::byte> repairedTiff(std::span<const std::byte> file) {
     const bool addBits = !hasBits && !several;
     const auto palette = findTiffEntry(numbers, layout, directory, kColorMap);
     if (!addBits && deflated == 0 && !palette) return {};
-    std::vector<std::byte> mended(file.begin(), file.end());
-    if (palette) repairPalette(numbers, *palette, mended);
-    if (deflated != 0) numbers.write(mended.data() + deflated, kDeflate, 2);
-    if (!addBits) return mended;
+    std::vector<std::byte> repaired(file.begin(), file.end());
+    if (palette) repairPalette(numbers, *palette, repaired);
+    if (deflated != 0) numbers.write(repaired.data() + deflated, kDeflate, 2);
+    if (!addBits) return repaired;
     // The directory is written anew behind the rest, to which its entries go on pointing.
     const std::vector<std::byte> old(
-        mended.begin() + static_cast<std::ptrdiff_t>(directory),
-        mended.begin() + static_cast<std::ptrdiff_t>(end + layout.offset));
+        repaired.begin() + static_cast<std::ptrdiff_t>(directory),
+        repaired.begin() + static_cast<std::ptrdiff_t>(end + layout.offset));
     const std::size_t at = file.size() + file.size() % 2;
-    mended.resize(at + old.size() + layout.entry);
-    numbers.write(mended.data() + layout.start, at, layout.offset);
-    std::byte* const to = mended.data() + at;
+    repaired.resize(at + old.size() + layout.entry);
+    numbers.write(repaired.data() + layout.start, at, layout.offset);
+    std::byte* const to = repaired.data() + at;
     const std::size_t upTo = layout.count + before * layout.entry;
     std::copy(old.begin(), old.begin() + static_cast<std::ptrdiff_t>(upTo), to);
     std::copy(old.begin() + static_cast<std::ptrdiff_t>(upTo), old.end(), to + upTo + layout.entry);
@@ -129,7 +129,7 @@ std::vector<std::byte> repairedTiff(std::span<const std::byte> file) {
     numbers.write(to + upTo + 2, kShort, 2);
     numbers.write(to + upTo + 4, 1, layout.offset);
     numbers.write(to + upTo + valueAt, 1, 2);
-    return mended;
+    return repaired;
 }
 
 }  // namespace stx::codecs

@@ -14,7 +14,8 @@ namespace stx::mpeg4 {
 /// coarser clock are one. Of a scene whose commands do not fit it, only commands are moments from
 /// there on.
 /// Errors: (unsupported) more than four million moments, or too many nodes to look at.
-/// `timesFromStart`: as SceneReadOptions has it. `job` is told which events of commands are lost.
+/// `timesFromStart`: as SceneReadOptions has it. A note of `job` names the events of commands that
+/// are lost.
 [[nodiscard]] Result<Timeline> timelineOf(const Document& document, const StreamImages& images,
                                           bool timesFromStart = false, Job* job = nullptr);
 

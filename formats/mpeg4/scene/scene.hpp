@@ -377,7 +377,7 @@ void walkNodes(const NodePtr& root, const std::function<bool(const NodePtr&)>& v
 [[nodiscard]] NodeList bodyOf(const Node& instance, std::size_t& copied);
 
 /// A graph as it is shown: what an instance of a PROTO shows is in its place, and nothing where it
-/// shows nothing. `root` itself where there is no instance; else what is above one is a copy, and
+/// shows nothing. `root` itself without any instance; else nodes above one are copies, and
 /// all others are the same nodes. Takes the nodes that are looked at from `budget`; null, with
 /// that below 0, where it does not suffice. Adds the instances.
 [[nodiscard]] NodePtr withoutInstances(NodePtr root, std::int64_t& budget, NodeList& instances);

@@ -211,7 +211,7 @@ class Walker {
         return {};
     }
 
-    /// What is said of a node that is no view: its type, and that of what a Shape has.
+    /// Names what a node that is not a view has: its type, and that of the geometry of a Shape.
     template <class Take>
     static void forEachLeftOut(const Node& node, const Take& take) {
         take(node.info->name);

@@ -13,7 +13,7 @@
 namespace stx::mpeg4 {
 namespace {
 
-/// What `<?xml version="1.0" encoding="NAME"?>` says; empty when there is none.
+/// NAME of `<?xml version="1.0" encoding="NAME"?>`; empty where that is missing.
 std::string_view declaredEncoding(std::string_view xml) {
     if (!xml.starts_with("<?xml")) return {};
     const auto head = xml.substr(0, xml.find("?>"));
@@ -26,22 +26,7 @@ bool isOneOf(std::string_view name, std::span<const std::string_view> names) {
     return std::ranges::any_of(names, [&](auto known) { return equalNoCase(name, known); });
 }
 
-std::string fromLatin1(std::string_view text) {
-    std::string utf8;
-    utf8.reserve(text.size());
-    for (const char c : text) {
-        const auto byte = static_cast<unsigned char>(c);
-        if (byte < 0x80) {
-            utf8 += c;
-            continue;
-        }
-        utf8 += static_cast<char>(0xC0 | byte >> 6);
-        utf8 += static_cast<char>(0x80 | (byte & 0x3F));
-    }
-    return utf8;
-}
-
-/// The first byte that begins no character of UTF-8; npos when there is none.
+/// The first byte that does not begin a character of UTF-8; npos when all do.
 std::size_t findBadUtf8(std::string_view text) {
     for (std::size_t at = 0; at < text.size();) {
         const auto bytes = firstCodePoint(text.substr(at)).bytes;
@@ -62,7 +47,7 @@ Result<std::optional<std::string>> utf8FromXml(std::string_view xml, const std::
     } else {
         const auto declared = declaredEncoding(xml);
         if (isOneOf(declared, kLatin1))
-            utf8 = fromLatin1(xml);
+            utf8 = textOf(utf8FromLatin1(std::as_bytes(std::span(xml))));
         else if (!isOneOf(declared, kUtf8))
             return failAt(fmt::format("'{}':1", fileName), ErrorCode::unsupported,
                           "the encoding is '{0}', and UTF-8, ISO-8859-1, and UTF-16 with a byte "

@@ -5,7 +5,7 @@
 namespace stx::video {
 
 /// Errors that libav* only logs since forgetErrors(), the first of each kind; else empty. Some
-/// damage is told nowhere else.
+/// damage shows nowhere else.
 struct LoggedErrors {
     std::string demuxer, other;
 };

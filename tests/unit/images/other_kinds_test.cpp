@@ -176,7 +176,7 @@ TEST(Tiff, WhiteIsZeroIsTurnedOfAnyBits) {
         }
 }
 
-/// Its directory, which is written anew behind the file, is no pixels.
+/// Its directory, which is written anew behind the file, is not read as pixels.
 TEST(Tiff, OneBitThatIsCutOffIsDamaged) {
     const Bytes strip(kWidth / 8 * kHeight, std::byte{0xa7});
     const auto file = [&](std::uint32_t at) {
