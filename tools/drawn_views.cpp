@@ -12,9 +12,13 @@ namespace {
 constexpr std::uint64_t kKnown = 2;
 constexpr PeakMemory kPreparing = {"drawing", 32};
 
+/// Of the memory that is left beside a spool, it takes one part of so many: frames take some, too.
+constexpr std::uint64_t kPartOfLeft = 2;
+
 struct DrawingTakes {
     std::uint64_t images = 0, pixels = 0;  ///< of the views
     std::uint64_t inMemory = 0, fromSpool = 0;
+    std::uint64_t beside = 0;  ///< of the second: what is not in the spool
 
     DrawingTakes(const ViewTable& table, const PeakMemory& drawing,
                  const std::vector<bool>& wanted) {
@@ -24,8 +28,12 @@ struct DrawingTakes {
             inMemory += table.bytesOf(i) + drawing.perPixel * table.pixelsOf(i);
             pixels += table.pixelsOf(i);
         }
-        const std::uint64_t beside = memoryOfEach(table, kPreparing) + kKnown * pixels;
+        beside = memoryOfEach(table, kPreparing) + kKnown * pixels;
         fromSpool = beside + beside / (kSpoolPart - 1);
+    }
+    /// What a spool may hold in memory. Of less it reads the same again.
+    [[nodiscard]] std::uint64_t spoolHolds(std::uint64_t limit) const {
+        return std::max(limit / kSpoolPart, limit > beside ? (limit - beside) / kPartOfLeft : 0);
     }
 };
 
@@ -46,7 +54,7 @@ Result<Bundle> viewsToDraw(
     const DrawingTakes takes(table, drawing, wanted);
     if (takes.inMemory > limit && takes.inMemory > takes.fromSpool) {
         STX_CHECK(checkDrawing(table, drawing, wanted, job.limits));
-        STX_TRY(spool, FileSpool::create(folder, limit / kSpoolPart));
+        STX_TRY(spool, FileSpool::create(folder, takes.spoolHolds(limit)));
     } else
         STX_CHECK(within(table.where(), job.limits.checkAllocation(takes.images, 1, "the views")));
     return someViews(table, wanted, spool.get(), job, look);
