@@ -66,7 +66,10 @@ Result<void> saveViews(const ViewTable& table, const fs::path& target, const Sav
     if (container == FileKind::exr && options.octreeLevels > 0)
         return fail(ErrorCode::usage, "'{}': an OctreeImage is written as .mp4, .xmt or .bt only",
                     target.string());
-    if (container == FileKind::exr && options.jpegQuality > 0)
+    if (container == FileKind::exr && options.pointTexture)
+        return fail(ErrorCode::usage, "'{}': PointTextures are written as .mp4, .xmt or .bt only",
+                    target.string());
+    if (container == FileKind::exr && options.jpegQuality != 0)
         return fail(ErrorCode::usage,
                     "'{}': JPEG is of MPEG-4 containers; .exr keeps colours as they are",
                     target.string());
@@ -83,7 +86,7 @@ Result<void> saveViews(const ViewTable& table, const fs::path& target, const Sav
 
 mpeg4::SceneWriteOptions mpeg4Scene(const SaveOptions& options) {
     mpeg4::SceneWriteOptions scene;
-    if (options.jpegQuality > 0) {
+    if (options.jpegQuality != 0) {
         scene.texture = mpeg4::SceneWriteOptions::Texture::jpeg;
         scene.jpegQuality = options.jpegQuality;
     }

@@ -192,6 +192,7 @@ Result<bool> writeViews(const ViewTable& table, bool hasPoints, const Summarise&
     const auto keep = [&](std::size_t i,
                           std::shared_ptr<const ReferenceView> view) -> Result<void> {
         STX_TRY(auto points, within(fmt::format("view {}", i), view->checkedPointCount()));
+        STX_CHECK(within(fmt::format("view {}", i), view->texture.check()));
         setPixelAttributes(parts[i], *view, points);
         if (summarise) parts[i].attributes["stx:summary"] = summarise(*view).text();
         if (!about.bounds) each[i] = view->computeBounds();

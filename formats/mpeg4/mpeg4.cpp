@@ -188,6 +188,9 @@ Result<void> writeMpeg4(const Mpeg4Document& document, const std::filesystem::pa
     if (!container)
         return fail(ErrorCode::usage, "'{}' has no ending of an MPEG-4 file: .mp4, .bt or .xmt",
                     path.string());
+    if (options.bifsVersion < 0 || options.bifsVersion > 2)
+        return fail(ErrorCode::usage, "BIFS of version {}; 1 and 2 are possible",
+                    options.bifsVersion);
     if (options.bifsVersion != 0 && options.bifsVersion != document.bifsConfig.version) {
         Mpeg4Document other = document;
         other.bifsConfig.version = options.bifsVersion;

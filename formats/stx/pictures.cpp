@@ -24,6 +24,7 @@ Result<std::unique_ptr<Renderer>> borrow(const Model& model, const RenderSetting
         return makeRenderer(backend, *atlas, settings, device, job);
     const auto& mesh = std::get<Mesh>(model);
     STX_CHECK(mesh.check());
+    STX_CHECK(settings.check());
     auto renderer = makeMeshRenderer(mesh, settings, job);
     if (settings.environment) renderer = withEnvironment(std::move(renderer), settings.environment);
     return renderer;

@@ -151,6 +151,9 @@ std::vector<Finding> validate(const Atlas& atlas) {
             !fits(page.emissive))
             findings.add(5004, fmt::format("page {}", p), "textures of several sizes",
                          sizeText(size.x, size.y));
+        if (const auto colours = page.texture.check(); !colours)
+            findings.add(4005, fmt::format("page {}", p), colours.error().message,
+                         "finite colours");
     }
     auto rectangles = atlas.rectangles;
     checkRectangles(atlas.views, static_cast<int>(atlas.pages.size()), size, rectangles, findings);

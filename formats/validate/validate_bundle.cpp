@@ -116,6 +116,8 @@ std::int64_t checkViewImages(const ReferenceView& view, const std::string& where
                      "one size");
         return 0;
     }
+    if (const auto colours = view.texture.check(); !colours)
+        findings.add(4005, where, colours.error().message, "finite colours");
     for (const auto* image : {&view.normal, &view.splatU, &view.splatV})
         if (!image->empty() && image->size() != size)
             findings.add(6001, where, sizeText(image->width(), image->height()),

@@ -20,11 +20,34 @@ Result<void> checkStillSettings(const StillSettings& s) {
     return {};
 }
 
+/// Frames of somebody else, which may not be what they say.
+class CheckedFrames final : public StillFrames {
+  public:
+    explicit CheckedFrames(StillFrames& frames) : frames_(frames) {}
+    [[nodiscard]] glm::ivec2 size() const override { return frames_.size(); }
+    [[nodiscard]] int count() const override { return frames_.count(); }
+    [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
+        STX_TRY(auto picture, frames_.frame(k));
+        if (!picture) return fail(ErrorCode::invalidInput, "frame {} is not there", k);
+        if (picture->size() != size())
+            return fail(ErrorCode::invalidInput, "frame {} is {}x{}; {}x{} is expected", k,
+                        picture->width(), picture->height(), size().x, size().y);
+        return picture;
+    }
+
+  private:
+    StillFrames& frames_;
+};
+
 }  // namespace
 
-Result<StillBackground> stillBackground(StillFrames& frames, const StillSettings& settings,
+Result<StillBackground> stillBackground(StillFrames& given, const StillSettings& settings,
                                         Job& job) {
     STX_CHECK(checkStillSettings(settings));
+    CheckedFrames frames(given);
+    if (frames.size().x < 1 || frames.size().y < 1)
+        return fail(ErrorCode::invalidInput, "frames of {}x{} pixels; 1x1 is the least",
+                    frames.size().x, frames.size().y);
     if (frames.count() < 2)
         return fail(ErrorCode::invalidInput,
                     "a background is made of at least 2 frames, and {} is here", frames.count());

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cstddef>
 #include <span>
+#include <utility>
 
 #include <glm/glm.hpp>
 
@@ -21,6 +22,15 @@ class Image {
     /// Errors of allocation are std::bad_alloc; sizes from files are checked against Limits before.
     Image(int width, int height, T fill = {})
         : width_(width), height_(height), pixels_(static_cast<std::size_t>(width) * height, fill) {}
+    Image(const Image&) = default;
+    Image& operator=(const Image&) = default;
+    /// What is moved from is empty.
+    Image(Image&& other) noexcept { swap(other); }
+    Image& operator=(Image&& other) noexcept {
+        Image(std::move(other)).swap(*this);
+        return *this;
+    }
+    ~Image() = default;
 
     [[nodiscard]] int width() const { return width_; }
     [[nodiscard]] int height() const { return height_; }
@@ -71,6 +81,12 @@ class Image {
     bool operator==(const Image&) const = default;
 
   private:
+    void swap(Image& other) noexcept {
+        std::swap(width_, other.width_);
+        std::swap(height_, other.height_);
+        std::swap(pixels_, other.pixels_);
+    }
+
     int width_ = 0;
     int height_ = 0;
     Pixels<T> pixels_;

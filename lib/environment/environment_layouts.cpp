@@ -71,6 +71,8 @@ glm::ivec2 equirectangularSizeOf(const Environment& environment) {
 }
 
 Result<Environment> asCube(const Environment& environment, int size, const Limits& limits) {
+    if (size < 1)
+        return fail(ErrorCode::usage, "faces of {}x{} pixels; 1x1 is the least", size, size);
     if (environment.layout == Environment::Layout::cube &&
         std::ranges::all_of(environment.pictures, [&](const Texture& t) {
             return t.empty() || (t.width() == size && t.height() == size);
@@ -95,6 +97,8 @@ Result<Environment> asCube(const Environment& environment, int size, const Limit
 Result<Environment> asEquirectangular(const Environment& environment, int width, int height,
                                       const Limits& limits) {
     const glm::ivec2 size(width, height);
+    if (width < 1 || height < 1)
+        return fail(ErrorCode::usage, "a picture of {}x{} pixels; 1x1 is the least", width, height);
     if (environment.layout == Environment::Layout::equirectangular &&
         (environment.pictures.empty() || equirectangularSizeOf(environment) == size))
         return environment;

@@ -55,7 +55,8 @@ class EnvironmentMap {
 [[nodiscard]] bool isOpaque(const Texture& picture);
 /// The environment as six faces of size x size, or as a picture of width x height all around.
 /// Resampled with a sharp filter where that is not coarser than it was, else averaged. What it has
-/// already is kept as it is. Errors: those of EnvironmentMap::make(), memory.
+/// already is kept as it is. Errors: those of EnvironmentMap::make(), memory, (usage) a size
+/// below 1.
 [[nodiscard]] Result<Environment> asCube(const Environment& environment, int size,
                                          const Limits& limits);
 [[nodiscard]] Result<Environment> asEquirectangular(const Environment& environment, int width,

@@ -1,6 +1,8 @@
 #include "lib/light/lighting.hpp"
 
+#include <cmath>
 #include <limits>
+#include <utility>
 
 #include "lib/model/srgb8.hpp"
 #include "lib/model/texture.hpp"
@@ -49,6 +51,33 @@ glm::vec3 shadePhong(const Lighting& lighting, glm::vec3 albedo, glm::vec3 posit
     Phong phong{lighting};
     return linear ? phong.shadePhong(albedo, position, normal, toEye)
                   : phong.shadeCoded(albedo, position, normal, toEye);
+}
+
+Result<void> Lighting::check() const {
+    const auto finite = [](glm::vec3 v) { return v * 0.0f == glm::vec3(0.0f); };
+    const auto isLight = [&](glm::vec3 v) {
+        return finite(v) && glm::all(glm::greaterThanEqual(v, glm::vec3(0.0f)));
+    };
+    if (!(shininess > 0) || !std::isfinite(shininess))
+        return fail(ErrorCode::usage, "shininess is {:g}; a number above 0 is expected", shininess);
+    for (const auto& [name, amount] : {std::pair{"ambient", ambient}, {"specular", specular}})
+        if (!isLight(amount))
+            return fail(ErrorCode::usage, "{} is {:g}, {:g}, {:g}; light is 0 or more", name,
+                        amount.x, amount.y, amount.z);
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        const Light& light = lights[i];
+        const bool directed = light.kind == Light::Kind::point || light.vector != glm::vec3(0.0f);
+        if (!finite(light.vector) || !directed)
+            return fail(ErrorCode::usage, "light {} is {} {:g}, {:g}, {:g}; {} is expected", i,
+                        light.kind == Light::Kind::point ? "at" : "along", light.vector.x,
+                        light.vector.y, light.vector.z,
+                        light.kind == Light::Kind::point ? "a place" : "a direction");
+        if (!isLight(light.colour))
+            return fail(ErrorCode::usage,
+                        "light {} has the colour {:g}, {:g}, {:g}; light is 0 or more", i,
+                        light.colour.x, light.colour.y, light.colour.z);
+    }
+    return {};
 }
 
 Lighting lightsInWorld(const Lighting& lighting, const glm::dmat4& worldFromCamera) {

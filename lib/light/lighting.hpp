@@ -5,6 +5,7 @@
 
 #include <glm/glm.hpp>
 
+#include "lib/base/result.hpp"
 #include "lib/environment/environment_light.hpp"
 
 namespace stx {
@@ -33,6 +34,9 @@ struct Lighting {
     bool beyondOne = false;
 
     [[nodiscard]] bool on() const { return !lights.empty() || environment; }
+    /// Errors (usage): light below 0, a directional light without a direction, an exponent that is
+    /// not above 0, values that are not finite.
+    [[nodiscard]] Result<void> check() const;
 };
 
 /// Phong: albedo * (ambient + sum of diffuse) + sum of specular, in linear light. All vectors in

@@ -173,6 +173,7 @@ Result<void> Atlas::check() const {
             return fail(ErrorCode::invalidInput,
                         "page {}: its textures must all be there and {}x{} like page 0's depth", i,
                         width(), height());
+        STX_CHECK(within(fmt::format("page {}", i), p.texture.check()));
         if (p.texture.isLinear() != pages[0].texture.isLinear())
             return fail(ErrorCode::invalidInput, "page {} has another colour space than page 0", i);
     }

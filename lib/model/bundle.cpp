@@ -65,7 +65,7 @@ Result<void> ReferenceView::checkHeader() const {
 Result<void> ReferenceView::check() const {
     STX_CHECK(checkHeader());
     STX_CHECK(checkedPointCount());
-    return {};
+    return texture.check();
 }
 
 const char* Bundle::nodeKind() const {

@@ -24,11 +24,13 @@ Result<void> Environment::check() const {
     if (pictureCount() == 0 && skyColours.empty() && groundColours.empty())
         return fail(ErrorCode::invalidInput,
                     "an environment has no picture, no sky and no ground; one of them is expected");
-    for (const Texture& t : pictures)
+    for (const Texture& t : pictures) {
+        STX_CHECK(within("an environment", t.check()));
         if (!t.empty() && t.isLinear() != linear())
             return fail(ErrorCode::invalidInput,
                         "an environment has pictures of 8-bit sRGB and of linear light; all must "
                         "be alike");
+    }
     const double length = orientation.w * orientation.w + orientation.x * orientation.x +
                           orientation.y * orientation.y + orientation.z * orientation.z;
     if (!(std::abs(length - 1.0) < 1e-4))

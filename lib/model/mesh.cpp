@@ -46,6 +46,10 @@ Result<void> Mesh::check() const {
                         "vertex {} is at ({}, {}, {}); positions must be finite", i, p.x, p.y, p.z);
     }
     const auto textureExists = [&](int t) { return t < static_cast<int>(textures.size()); };
+    for (std::size_t i = 0; i < textures.size(); ++i) {
+        if (textures[i].pixels.empty())
+            return fail(ErrorCode::invalidInput, "texture {} has no pixels", i);
+    }
     for (const auto& m : materials) {
         if (!textureExists(m.baseColourTexture) || !textureExists(m.normalTexture) ||
             !textureExists(m.emissiveTexture) || !textureExists(m.metallicRoughnessTexture))

@@ -20,6 +20,17 @@ float linearFromSrgb(float coded) {
     return std::pow((coded + 0.055f) / 1.055f, 2.4f);
 }
 
+Result<void> Texture::check() const {
+    const auto* linear = rgbaFloat();
+    if (!linear) return {};
+    const auto finite = [](const glm::vec4& c) { return c * 0.0f == glm::vec4(0.0f); };
+    const auto wrong = std::ranges::find_if_not(linear->pixels(), finite);
+    if (wrong == linear->pixels().end()) return {};
+    const auto at = static_cast<int>(wrong - linear->pixels().begin());
+    return fail(ErrorCode::invalidInput, "a colour at column {}, row {} is not finite",
+                at % linear->width(), at / linear->width());
+}
+
 namespace {
 
 constexpr Float4 kNothing = {};

@@ -6,6 +6,7 @@
 #include <glm/glm.hpp>
 
 #include "lib/base/image.hpp"
+#include "lib/base/result.hpp"
 
 namespace stx {
 
@@ -38,6 +39,8 @@ class Texture {
         return std::visit([](const auto& i) { return i.height(); }, image_);
     }
     [[nodiscard]] bool empty() const { return width() == 0; }
+    /// Error (invalidInput): a colour or alpha that is not finite, with its place.
+    [[nodiscard]] Result<void> check() const;
 
     /// Straight RGBA as floats in the image's own space: 8-bit values / 255 (still sRGB-coded), or
     /// the linear floats as they are.

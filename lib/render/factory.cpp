@@ -160,6 +160,7 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
                                            const RenderSettings& wanted,
                                            const std::shared_ptr<const Environment>& own,
                                            int device, Job& job) {
+    STX_CHECK(wanted.check());
     STX_TRY(const auto environment, environmentOf(wanted, own, job));
     RenderSettings settings = wanted;
     // Alpha inside of the object is not an outline for surfaces to end at.

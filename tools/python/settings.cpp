@@ -48,12 +48,7 @@ void takeLighting(const Keywords& given, Lighting& lighting) {
     if (const auto grey = given.find("specular")) lighting.specular = colourFrom(*grey, "specular");
     given.take("shininess", lighting.shininess);
     given.take("beyond_one", lighting.beyondOne);
-    if (!(lighting.shininess > 0 && std::isfinite(lighting.shininess)))
-        refuse("shininess is {:g}; a number above 0 is expected", lighting.shininess);
-    for (const auto& [name, light] :
-         {std::pair{"ambient", lighting.ambient}, std::pair{"specular", lighting.specular}})
-        if (glm::any(glm::lessThan(light, glm::vec3(0))))
-            refuse("{} is negative; light is 0 or more", name);
+    if (const auto ok = lighting.check(); !ok) refuse("{}", ok.error().message);
     if (lighting.on()) return;
     const Lighting usual;
     const char* unused = lighting.ambient != usual.ambient       ? "ambient"

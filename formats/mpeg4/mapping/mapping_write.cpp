@@ -225,6 +225,9 @@ class SceneWriter {
         if (options_.jpegQuality < 1 || options_.jpegQuality > 100)
             return fail(ErrorCode::usage, "the JPEG quality is {}; 1 to 100 is possible",
                         options_.jpegQuality);
+        if (options_.h264 < -1 || options_.h264 > 51)
+            return fail(ErrorCode::usage, "the quality of H.264 is {}; 0 to 51 is possible",
+                        options_.h264);
         if (options_.depthBits != 0 && options_.depthBits != 8 && options_.depthBits != 16)
             return fail(ErrorCode::usage,
                         "depth of {} bits has no place in MPEG-4; 8 or 16 is possible",

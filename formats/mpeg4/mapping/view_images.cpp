@@ -96,6 +96,7 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
     const DepthCode code{out.nearPlane, out.farPlane,
                          writtenDepthBits(view, options) == 8 ? 255u : 65535u};
     const bool mayBeUnknown = view.depthMayBeUnknown();
+    STX_CHECK(view.texture.check());
     out.linear = view.texture.isLinear();
     if (options.pointTexture) {
         for (const float d : view.depth.pixels()) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <string>
 
@@ -62,6 +63,13 @@ struct RenderSettings {
     /// Told what each stage takes and changes; null: nobody asks.
     std::shared_ptr<StageLog> log;
 
+    /// Errors (usage): those of Lighting::check(), a coefficient that is not 0 or more.
+    [[nodiscard]] Result<void> check() const {
+        STX_CHECK(lighting.check());
+        if (splatCoefficient >= 0 && std::isfinite(splatCoefficient)) return {};
+        return fail(ErrorCode::usage, "splatCoefficient is {:g}; 0 or more is expected",
+                    splatCoefficient);
+    }
     [[nodiscard]] bool does(Stage stage) const { return !without.has(stage); }
     [[nodiscard]] bool wantNormals() const { return normals || lighting.on(); }
 };

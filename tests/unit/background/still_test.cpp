@@ -39,6 +39,19 @@ DrawnFrames fidget() {
             }};
 }
 
+TEST(StillBackground, FramesThatAreNotOfTheirSizeAreRefused) {
+    Job job;
+    DrawnFrames small({40, 40}, 4, [](int) { return Rgba8Image(4, 4, {7, 7, 7, 255}); });
+    DrawnFrames none({0, 0}, 4, [](int) { return Rgba8Image(); });
+    for (const auto method : {StillMethod::select, StillMethod::median, StillMethod::n2pg}) {
+        const auto wrong = stillBackground(small, methodOf(method), job);
+        ASSERT_FALSE(wrong);
+        EXPECT_EQ(wrong.error().code, ErrorCode::invalidInput);
+        EXPECT_EQ(wrong.error().text(), "frame 0 is 4x4; 40x40 is expected");
+        EXPECT_FALSE(stillBackground(none, methodOf(method), job));
+    }
+}
+
 TEST(SpreadFrames, GoesFromTheFirstToTheLast) {
     EXPECT_EQ(spreadFrames(5, 0), (std::vector<int>{0, 1, 2, 3, 4}));
     EXPECT_EQ(spreadFrames(5, 9), (std::vector<int>{0, 1, 2, 3, 4}));

@@ -154,6 +154,99 @@ TEST(Stx, WhatIsNotSoundIsRefused) {
     EXPECT_TRUE(boundsOf(Model(*atlas)).empty());
 }
 
+TEST(Stx, ColoursThatAreNotFiniteAreRefused) {
+    Job job;
+    const TemporaryFolder folder;
+    Bundle bundle = smallBundle(2, 8, false, false);
+    for (ReferenceView& view : bundle.views)
+        view.texture = RgbaFloatImage(view.camera.width, view.camera.height, glm::vec4(0.5f));
+    auto atlas = pack(bundle, {}, job);
+    ASSERT_TRUE(atlas) << atlas.error().text();
+    bundle.views[1].texture.rgbaFloat()->at(3, 2).g = NAN;
+    atlas->pages[0].texture.rgbaFloat()->at(1, 0).r = INFINITY;
+    const auto refused = [](const auto& result, const std::string& expected) {
+        ASSERT_FALSE(result);
+        EXPECT_EQ(result.error().code, ErrorCode::invalidInput);
+        EXPECT_EQ(result.error().text(), expected);
+    };
+    const std::string wrong = "a colour at column 3, row 2 is not finite";
+    const std::string exr = folder / "a.exr";
+    refused(bundle.check(), "view 1: " + wrong);
+    refused(save(bundle, exr, {}, job), "'" + exr + "': view 1: " + wrong);
+    refused(save(bundle, folder / "a.mp4", {}, job), "view 1 'view 1': " + wrong);
+    refused(render(Model(bundle), bundle.views[0].camera, {}, job), "view 1: " + wrong);
+    refused(atlas->check(), "page 0: a colour at column 1, row 0 is not finite");
+    const std::string file = STX_SOURCE_DIR "/tests/fuzz/corpus/exr/not_finite_colour.exr";
+    refused(open(file, {}, job), "'" + file + "': view 0: " + wrong);
+    const auto findings = validateFile(file, {}, job);
+    ASSERT_TRUE(findings);
+    ASSERT_EQ(findings->size(), 1u);
+    EXPECT_EQ((*findings)[0].rule->number, 4005);
+    Environment around;
+    around.layout = Environment::Layout::equirectangular;
+    around.pictures = {RgbaFloatImage(4, 2, glm::vec4(NAN))};
+    refused(around.check(), "an environment: a colour at column 0, row 0 is not finite");
+}
+
+TEST(Stx, ATextureWithoutPixelsIsRefused) {
+    Job job;
+    Mesh mesh = quad();
+    mesh.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    mesh.textures.resize(1);
+    mesh.materials[0].baseColourTexture = 0;
+    const auto converted = convert(Model(mesh), {}, job);
+    ASSERT_FALSE(converted);
+    EXPECT_EQ(converted.error().text(), "texture 0 has no pixels");
+}
+
+TEST(Stx, SettingsOfPicturesOutOfRangeAreRefused) {
+    Job job;
+    const Bundle bundle = smallBundle(1, 8, false, false);
+    const auto messageOf = [&](auto change) {
+        RenderSettings settings;
+        settings.lighting.lights.emplace_back();
+        change(settings);
+        const auto frame = render(Model(bundle), bundle.views[0].camera, settings, job);
+        if (frame) return std::string("none");
+        EXPECT_EQ(frame.error().code, ErrorCode::usage);
+        return frame.error().text();
+    };
+    EXPECT_EQ(messageOf([](auto&) {}), "none");
+    EXPECT_EQ(messageOf([](auto& s) { s.lighting.shininess = 0; }),
+              "shininess is 0; a number above 0 is expected");
+    EXPECT_EQ(messageOf([](auto& s) { s.lighting.shininess = NAN; }),
+              "shininess is nan; a number above 0 is expected");
+    EXPECT_EQ(messageOf([](auto& s) { s.lighting.ambient = glm::vec3(NAN, 0, 0); }),
+              "ambient is nan, 0, 0; light is 0 or more");
+    EXPECT_EQ(messageOf([](auto& s) { s.lighting.specular.y = -1; }),
+              "specular is 0, -1, 0; light is 0 or more");
+    EXPECT_EQ(messageOf([](auto& s) { s.lighting.lights[0].vector = glm::vec3(0); }),
+              "light 0 is along 0, 0, 0; a direction is expected");
+    EXPECT_EQ(messageOf([](auto& s) { s.lighting.lights[0].colour.z = -2; }),
+              "light 0 has the colour 1, 1, -2; light is 0 or more");
+    EXPECT_EQ(messageOf([](auto& s) { s.splatCoefficient = NAN; }),
+              "splatCoefficient is nan; 0 or more is expected");
+}
+
+TEST(Stx, SettingsOfFilesOutOfRangeAreRefused) {
+    Job job;
+    const TemporaryFolder folder;
+    const Bundle bundle = smallBundle(1, 8, false, false);
+    const auto refuses = [&](const SaveOptions& options, const char* name) {
+        const auto saved = save(bundle, folder.path() / name, options, job);
+        return !saved && saved.error().code == ErrorCode::usage;
+    };
+    EXPECT_TRUE(refuses({.bifsVersion = 3}, "a.mp4"));
+    EXPECT_TRUE(refuses({.jpegQuality = -1}, "a.mp4"));
+    EXPECT_TRUE(refuses({.h264 = 99}, "a.mp4"));
+    EXPECT_TRUE(refuses({.pointTexture = true}, "a.exr"));
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+    Environment sky;
+    sky.skyColours = {glm::vec3(1)};
+    EXPECT_FALSE(asCube(sky, 0, {}));
+    EXPECT_FALSE(asEquirectangular(sky, 4, 0, {}));
+}
+
 TEST(Stx, NotesWhatDepthInEightBitsCosts) {
     Job job;
     ConvertSettings settings;
