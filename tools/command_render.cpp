@@ -326,6 +326,7 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
         if (light == kEnvironmentLight) continue;
         STX_TRY(settings.lighting.lights[at++], parseLight(light, scene.context.origin));
     }
+    writing.origin = scene.context.origin;
     if (lightsByEnvironment(o) && !scene.moving)
         STX_CHECK(lightBy(scene.model, settings, program.job));
     STX_TRY(const auto pictures, picturesOf(o, scene, program));

@@ -171,3 +171,4 @@ Result<Comparison> compare(const Picture& a, const Picture& b, const CompareSett
 }
 
 }  // namespace stx
+    file.origin = options.origin;

@@ -289,6 +289,7 @@ struct PictureOptions {
 [[nodiscard]] Result<void> save(const Frame& frame, const std::filesystem::path& target,
                                 const PictureOptions& options, Job& job);
 
+    glm::dvec3 origin{0.0};          ///< OpenEXR: what the camera counts from, as originOf() says
 /// PSNR, SSIM and the worst pixel of two pictures of one size, as PicturePair says, with a note
 /// when only one is linear; of 16 bits the worst pixel is in their codes. Pictures in memory:
 /// compare() of two images. Errors: invalidInput when sizes disagree or the mask leaves nothing.
