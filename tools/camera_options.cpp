@@ -159,7 +159,7 @@ Result<void> checkWays(const CameraOptions& o) {
     if (o.fovDeg && !(*o.fovDeg > 0.0 && *o.fovDeg < 180.0))
         return fail(ErrorCode::usage, "--fov is {:g}; it must be above 0 and below 180 degrees",
                     *o.fovDeg);
-    if (o.orthoHeight && !(*o.orthoHeight > 0.0 && std::isfinite(*o.orthoHeight)))
+    if (o.orthoHeight && !(*o.orthoHeight > 0.0))
         return fail(ErrorCode::usage, "--ortho is {:g}; the window's height must be above 0",
                     *o.orthoHeight);
     if (o.fovDeg && o.orthoHeight)

@@ -37,6 +37,7 @@ nlohmann::ordered_json number(std::optional<double> v) {
 struct Scores {
     Comparison plain;
     ImmersiveComparison immersive;
+    bool codes16 = false;  ///< codes of 16 bits were compared
 };
 
 nlohmann::ordered_json toJson(const Scores& scores) {
@@ -68,27 +69,29 @@ Result<Scores> comparePair(const std::string& a, const std::string& b, const Com
                         "'{}' holds {} pictures, and compare looks at one; 'stx extract {} -o "
                         "FOLDER' makes files of a bundle's",
                         *file, picture->pictures, *file);
-    CompareSettings settings;
-    settings.mask = mask;
-    STX_TRY(settings.background, parseColour(o.background, "--background"));
+    CompareSettings asked;
+    asked.mask = mask;
+    STX_TRY(asked.background, parseColour(o.background, "--background"));
     Scores scores;
-    STX_TRY(auto result, within(fmt::format("'{}' and '{}'", a, b),
-                                compare(first, second, settings, program.job)));
+    STX_TRY(auto result,
+            within(fmt::format("'{}' and '{}'", a, b), compare(first, second, asked, program.job)));
     scores.plain = result;
     if (result.identical() && !first.others.empty())
         program.job.note(fmt::format("only colours are compared; '{}' holds {}, too", a,
                                      fmt::join(first.others, ", ")));
-    const PicturePair floats(first, second);
-    const bool asFloats = floats.first();
+    const PicturePair pair(first, second);
+    const CompareSettings settings = pair.settings(asked);
+    const bool asFloats = pair.first();
+    scores.codes16 = pair.codes16();
     if (asFloats)
-        scores.immersive.add(*floats.first(), *floats.second(), settings);
+        scores.immersive.add(*pair.first(), *pair.second(), settings);
     else
         scores.immersive.add(first.coded, second.coded, settings);
-    if (steadiness && asFloats) steadiness->add(*floats.first(), *floats.second(), settings);
+    if (steadiness && asFloats) steadiness->add(*pair.first(), *pair.second(), settings);
     if (steadiness && !asFloats) steadiness->add(first.coded, second.coded, settings);
     if (!o.errorPicture.empty()) {
         STX_TRY(const auto picture,
-                asFloats ? errorPicture(*floats.first(), *floats.second(), settings, o.gain)
+                asFloats ? errorPicture(*pair.first(), *pair.second(), settings, o.gain)
                          : errorPicture(first.coded, second.coded, settings, o.gain));
         STX_TRY(const auto png,
                 encodePng(picture.width(), picture.height(), 4, 8, picture.data(), true));
@@ -204,6 +207,7 @@ struct ManyScores {
     nlohmann::ordered_json perPair = nlohmann::ordered_json::array();
     Pair worst;
     Steadiness steadiness;  ///< of sequences
+    int worstStep = 0;      ///< the frame that its largest change leads to
 };
 
 Result<ManyScores> compareMany(const CompareOptions& o, bool folders,
@@ -214,7 +218,7 @@ Result<ManyScores> compareMany(const CompareOptions& o, bool folders,
         STX_SET(pairs, pairsOfFolders(o));
     else
         pairs = pairsOfSequences(o, program.job);
-    SequenceComparison sequence(255.0);
+    SequenceComparison sequence;
     for (const Pair& pair : pairs) {
         STX_CHECK(program.job.checkCancelled());
         CompareOptions one = o;
@@ -223,6 +227,7 @@ Result<ManyScores> compareMany(const CompareOptions& o, bool folders,
         STX_TRY(const auto c, comparePair(pair.a, pair.b, one, mask,
                                           folders ? nullptr : &many.steadiness, program));
         sequence.add(c.plain);
+        if (sequence.frames() == 1) many.total.codes16 = c.codes16;
         many.total.immersive.add(c.immersive);
         auto entry = toJson(c);
         if (folders)
@@ -235,6 +240,7 @@ Result<ManyScores> compareMany(const CompareOptions& o, bool folders,
     }
     many.total.plain = sequence.total();
     many.worst = pairs[sequence.worstFrame()];
+    many.worstStep = pairs[many.steadiness.worstFrame()].frame;
     return many;
 }
 
@@ -284,12 +290,12 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
         out.update(toJson(many.total));
     }
     const Steadiness& steadiness = many.steadiness;
-    const int worstStep = o.firstFrame + steadiness.worstFrame();
+    const auto inValues = [&](double v) { return many.total.codes16 ? inCodes16(v) : v; };
     if (steadiness.steps() > 0)
         out["unsteadiness"] = {
-            {"mean", steadiness.mean()},
-            {"worst", steadiness.worst()},
-            {"worstFrame", worstStep},
+            {"mean", inValues(steadiness.mean())},
+            {"worst", inValues(steadiness.worst())},
+            {"worstFrame", many.worstStep},
         };
     STX_CHECK(program.writeReport(out));
     if (program.common.format == "json") {
@@ -300,7 +306,7 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
             program.print(fmt::format(
                 "changes from frame to frame: {:.3f} beyond those of B, {:.3f} at worst (frame "
                 "{})\n",
-                steadiness.mean(), steadiness.worst(), worstStep));
+                inValues(steadiness.mean()), inValues(steadiness.worst()), many.worstStep));
     }
     return exitCodeOf(many.total, o);
 }

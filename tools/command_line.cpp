@@ -1,6 +1,7 @@
 #include "tools/command_line.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <sstream>
 
@@ -251,6 +252,9 @@ requires(!std::invocable<Value&, const std::string&>) Option Command::option(
     const std::string& names, Value& to, const std::string& help) {
     constexpr bool kSeveral = std::is_same_v<Value, std::vector<std::string>>;
     CLI::Option* option = app_->add_option(names, to, help);
+    if constexpr (std::is_same_v<Value, double> || std::is_same_v<Value, std::optional<double>>)
+        option->check(numberThat([](double v) { return !std::isfinite(v); },
+                                 "a finite number is expected", ""));
     // Positionals are names of inputs, or words among which - is none.
     if constexpr (kSeveral || std::is_same_v<Value, std::string>)
         if (option->get_positional())

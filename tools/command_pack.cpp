@@ -384,7 +384,6 @@ Result<int> packInput(const PackOptions& options, const Command& command, Progra
     if (o.quality && o.colour != "jpeg")
         return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
     STX_CHECK(setSize(o.size, program.job.limits, o.settings));
-    STX_CHECK(checkTime(o.time));
     STX_CHECK(checkTarget(o.output, program));
     o.settings.bytesToWrite = bytesToWriteAtlas(o.output);
     if (!o.budget.empty()) STX_SET(o.pruning.budget, parsePixels(o.budget));

@@ -122,11 +122,6 @@ Result<RenderSettings> settingsOf(const RenderOptions& o) {
         if (glm::any(glm::lessThan(value, glm::vec3(0.0f))))
             return fail(ErrorCode::usage, "{} is negative; light is 0 or more", option);
     }
-    for (const auto& [option, value] : {std::pair{"--shininess", o.shininess},
-                                        std::pair{"--splat-coefficient", s.splatCoefficient}}) {
-        if (!std::isfinite(value))
-            return fail(ErrorCode::usage, "{} is {}; a finite number is expected", option, value);
-    }
     return s;
 }
 
@@ -331,6 +326,7 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     STX_TRY(const auto pictures, picturesOf(o, scene, program));
     STX_CHECK(checkNames(o, static_cast<int>(pictures.size()), program));
     STX_CHECK(checkPictures(o, settings, pictures, scene, program.job.limits));
+    writing.origin = scene.context.origin;
     writing.rate = ownRate(o, scene, pictures, program.job).value_or(writing.rate);
     if (!scene.moving) {
         STX_CHECK(makeStill(o, settings, pictures, scene, program.job));

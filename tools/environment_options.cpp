@@ -1,7 +1,5 @@
 #include "tools/environment_options.hpp"
 
-#include <cmath>
-
 #include "formats/environment/environment_files.hpp"
 #include "lib/geometry/camera.hpp"
 
@@ -33,9 +31,6 @@ Result<void> checkEnvironmentOptions(const EnvironmentOptions& options, const Co
     if (!options.given() || options.none())
         STX_CHECK(command.refuse({"--environment-up", "--environment-turn"},
                                  "is of an environment; give --environment FILE, too"));
-    if (!std::isfinite(options.turnDeg))
-        return fail(ErrorCode::usage, "--environment-turn is {}; a finite number is expected",
-                    options.turnDeg);
     STX_CHECK(upOf(options));
     return {};
 }

@@ -111,6 +111,7 @@ Result<void> FrameWriter::writeOne(const Item& item) {
         file.noClobber = settings_.noClobber;
         file.pngLevel = settings_.compression;
         file.camera = item.camera;
+        file.origin = settings_.origin;
         file.around = settings_.around;
         return item.picture.empty() ? writeExrFrame(item.frame, nameOf(item.index), file)
                                     : writePicture(item.picture, nameOf(item.index), file);

@@ -29,7 +29,8 @@ class FrameWriter {
         std::pair<int, int> rate{25, 1};  ///< frames per second, a fraction
         int compression = 1;              ///< of PNG, 0 (fast, large) to 9
         bool noClobber = false;
-        bool around = false;  ///< pictures are equirectangular
+        bool around = false;     ///< pictures are equirectangular
+        glm::dvec3 origin{0.0};  ///< what cameras count from
     };
     /// Errors (usage) when the ending or the stream makes no sense.
     [[nodiscard]] static Result<void> check(const Settings& settings);

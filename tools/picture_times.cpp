@@ -70,14 +70,8 @@ double exactnessOf(const Timeline& line, double rate) {
 
 }  // namespace
 
-Result<void> checkTime(const std::optional<double>& time) {
-    if (!time || std::isfinite(*time)) return {};
-    return fail(ErrorCode::usage, "--time is {}; a finite number of seconds is expected", *time);
-}
-
 Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& timeline,
                              const char* whatIs, const std::string& input, Job& job) {
-    STX_CHECK(checkTime(time));
     if (whatIs && !time && timeline.moves())
         return fail(ErrorCode::usage,
                     "'{}' has {} frames, and {} of one moment; give --time T, in seconds", input,
@@ -90,10 +84,7 @@ Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& 
 }
 
 Result<std::vector<double>> timesOf(const TimeOptions& o, const Timeline& timeline) {
-    if (o.time) {
-        STX_CHECK(checkTime(o.time));
-        return std::vector<double>{*o.time};
-    }
+    if (o.time) return std::vector<double>{*o.time};
     if (o.times.empty() || o.times == "all" || o.times == "cameras") return timeline.times;
     STX_TRY(const auto numbers, parseTimes(o.times));
     std::vector<double> times;

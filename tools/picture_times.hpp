@@ -22,11 +22,9 @@ struct TimeOptions {
     [[nodiscard]] bool any() const { return time.has_value() || !times.empty(); }
 };
 
-/// Errors (usage): a time that is none (NaN, infinity).
-[[nodiscard]] Result<void> checkTime(const std::optional<double>& time);
 /// The frame of --time, the first where it is not given; a time outside the film is noted, and one
-/// of what does not move. Errors (usage): as checkTime(); none of a film for what is of one moment
-/// only: `whatIs`, as in "points are", else null.
+/// of what does not move. Errors (usage): none of a film for what is of one moment only: `whatIs`,
+/// as in "points are", else null.
 [[nodiscard]] Result<std::size_t> momentOf(const std::optional<double>& time,
                                            const Timeline& timeline, const char* whatIs,
                                            const std::string& input, Job& job);

@@ -135,7 +135,7 @@ std::vector<ExrPart> partsFrom(const ViewTable& table) {
     first["stx:kind"] = std::string("bundle");
     first["stx:colour"] = std::string(table.kindsOf(0).linear ? "linear" : "sRGB8");
     if (!bundle.title.empty()) first["stx:title"] = bundle.title;
-    if (bundle.origin != glm::dvec3(0.0)) first["stx:origin"] = bundle.origin;
+    setExrOrigin(parts[0], bundle.origin);
     if (bundle.time) first["stx:time"] = *bundle.time;
     if (bundle.duration) first["stx:duration"] = *bundle.duration;
     return parts;
@@ -362,9 +362,7 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
     const auto* min = first.attribute<glm::dvec3>("stx:boundsMin");
     const auto* max = first.attribute<glm::dvec3>("stx:boundsMax");
     if (min && max) header.bounds = Bounds{*min, *max};
-    if (const auto* origin = first.attribute<glm::dvec3>("stx:origin");
-        origin && std::isfinite(origin->x + origin->y + origin->z))
-        header.origin = *origin;
+    header.origin = exrOrigin(reader);
     if (const auto* time = first.attribute<double>("stx:time"); time && std::isfinite(*time))
         header.time = *time;
     if (const auto* shown = first.attribute<double>("stx:duration");

@@ -103,6 +103,9 @@ struct ExrBundleHeader {
 void setExrCamera(ExrPart& part, const ReferenceView& view);
 /// Standard attributes only, without planes.
 void setExrCamera(ExrPart& part, const Camera& camera, double nearPlane, double farPlane);
+/// What the cameras of a file count from, as Bundle::origin, in its first part; 0 is left out.
+void setExrOrigin(ExrPart& first, const glm::dvec3& origin);
+[[nodiscard]] glm::dvec3 exrOrigin(const ExrReader& reader);
 /// Error (invalidInput) when there is none, or it makes no sense. Its images are empty.
 [[nodiscard]] Result<ReferenceView> exrCamera(const ExrPart& part);
 

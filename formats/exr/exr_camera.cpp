@@ -118,6 +118,15 @@ void setExrCamera(ExrPart& part, const ReferenceView& view) {
     if (view.background) a["stx:background"] = std::int64_t{1};
 }
 
+void setExrOrigin(ExrPart& first, const glm::dvec3& origin) {
+    if (origin != glm::dvec3(0.0)) first.attributes["stx:origin"] = origin;
+}
+
+glm::dvec3 exrOrigin(const ExrReader& reader) {
+    const auto* origin = reader.parts()[0].attribute<glm::dvec3>("stx:origin");
+    return origin && std::isfinite(origin->x + origin->y + origin->z) ? *origin : glm::dvec3(0.0);
+}
+
 Result<ReferenceView> exrCamera(const ExrPart& part) {
     ReferenceView view;
     view.name = part.name;

@@ -105,6 +105,7 @@ Result<void> writeExr(const ExrFrame& frame, OutputFile& file, const FrameOption
             part.pixelAspectRatio = aspect;
         // Planes only scale the third coordinate of NDC, which nobody uses.
         setExrCamera(part, *options.camera, 0.0, 1.0);
+        setExrOrigin(part, options.origin);
     }
     const std::size_t pixels = static_cast<std::size_t>(frame.width) * frame.height;
     std::vector<ExrConstPixels> values;

@@ -38,6 +38,7 @@ struct FrameOptions {
     bool noClobber = false;
     /// EXR: gets into the standard attributes worldToCamera, worldToNDC, screenWindow...
     std::optional<Camera> camera;
+    glm::dvec3 origin{0.0};  ///< EXR: what the camera counts from; gets into stx:origin
     /// EXR: the picture is equirectangular (renderAround()): it gets the attribute envmap, and Z is
     /// the length of the ray.
     bool around = false;

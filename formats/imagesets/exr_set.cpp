@@ -40,6 +40,8 @@ std::map<std::string, ExrView> viewsOf(const ExrReader& reader) {
         for (const ExrChannel& channel : part.channels) {
             const std::string prefix = prefixOf(channel.name);
             const std::string leaf = channel.name.substr(prefix.size());
+            // N.Y and N.Z beside N.X are coordinates.
+            if (part.channel(prefix + "X")) continue;
             std::string name = part.view;
             if (name.empty() && !prefix.empty()) name = prefix.substr(0, prefix.size() - 1);
             if (name.empty() && parts.size() > 1) {
@@ -52,7 +54,9 @@ std::map<std::string, ExrView> viewsOf(const ExrReader& reader) {
             ExrView& view = views[name];
             view.name = name;
             Layer& layer = isDepth ? view.depth : view.colour;
-            if (layer.part < 0) layer = {static_cast<int>(i), prefix};
+            // What is in no layer is the view's own: Albedo.R comes before R.
+            if (layer.part < 0 || prefix.size() < layer.prefix.size())
+                layer = {static_cast<int>(i), prefix};
         }
     }
     std::erase_if(
@@ -123,6 +127,7 @@ Camera shifted(Camera camera, const ExrPart& depth) {
     return camera;
 }
 
+/// In the world.
 Result<Camera> cameraOf(const ExrReader& reader, const ExrView& view,
                         const std::vector<NamedCamera>& beside, const std::string& stem,
                         std::size_t index, std::size_t count) {
@@ -134,6 +139,7 @@ Result<Camera> cameraOf(const ExrReader& reader, const ExrView& view,
             continue;
         STX_TRY(const ReferenceView known, within(reader.where(), exrCamera(*part)));
         Camera c = known.camera;
+        c.position += exrOrigin(reader);
         c.cx += part->originX;
         c.cy += part->originY;
         return shifted(c, depth);
@@ -212,6 +218,8 @@ Result<SetDescription> describeExr(const path& given, const ImageSetOptions&, Jo
         view.texture.path = view.depth.path = all[i].file;
         STX_TRY(view.camera,
                 cameraOf(reader, all[i].view, beside, all[i].file.stem().string(), i, all.size()));
+        if (const glm::dvec3 origin = exrOrigin(reader); !set.origin && origin != glm::dvec3(0.0))
+            set.origin = origin;
         view.load = [found = all[i]](const SetView&, Job& inner) {
             return loadView(found.file, found.view, inner);
         };

@@ -32,7 +32,12 @@ Result<int> depthChannel(const DecodedImage& image, std::string_view name) {
         return it == names.end() ? -1 : static_cast<int>(it - names.begin());
     };
     int at = find([](const std::string& n) { return n == "Z"; });
-    if (at < 0) at = find([](const std::string& n) { return n.ends_with(".Z"); });
+    // N.Z beside N.X is a coordinate.
+    if (at < 0)
+        at = find([&](const std::string& n) {
+            return n.ends_with(".Z") &&
+                   std::ranges::find(names, n.substr(0, n.size() - 1) + "X") == names.end();
+        });
     for (const char* other : {"depth", "Depth", "V", "Depth.V"})
         if (at < 0) at = find([&](const std::string& n) { return n == other; });
     if (at >= 0) return at;

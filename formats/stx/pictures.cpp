@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "formats/files/messages.hpp"
 #include "formats/images/exif.hpp"
@@ -8,6 +9,8 @@
 #include "formats/photos/file_colours.hpp"
 #include "formats/photos/photo.hpp"
 #include "formats/stx/stx.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/model/texture.hpp"
 #include "lib/render/compose/environment_behind.hpp"
 #include "lib/render/factory.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
@@ -38,6 +41,32 @@ Result<Rgba8Image> heifPicture(Bytes bytes, Job& job) {
     STX_TRY(auto picture, photos::decodeColour(photo, profile, job));
     if (!profile.empty()) job.note(profile);
     return picture;
+}
+
+constexpr double kWhite16 = 65535;
+
+/// sRGB codes of 16 bits, as floats of 0..1.
+RgbaFloatImage codes16From(const RgbaFloatImage& linear) {
+    RgbaFloatImage codes(linear.width(), linear.height());
+    const auto code = [](float v) {
+        constexpr auto kWhite = static_cast<float>(kWhite16);
+        return std::round(kWhite * std::clamp(v, 0.0f, 1.0f)) / kWhite;
+    };
+    parallelFor(0, linear.height(), 16, [&](int y) {
+        for (int x = 0; x < linear.width(); ++x) {
+            const glm::vec4 c = linear.at(x, y);
+            codes.at(x, y) = {code(srgbFromLinear(c.r)), code(srgbFromLinear(c.g)),
+                              code(srgbFromLinear(c.b)), code(c.a)};
+        }
+    });
+    return codes;
+}
+
+RgbaFloatImage spread(const Rgba8Image& coded) {
+    RgbaFloatImage codes(coded.width(), coded.height());
+    for (std::size_t i = 0; i < codes.count(); ++i)
+        codes.data()[i] = glm::vec4(coded.data()[i]) / 255.0f;
+    return codes;
 }
 
 /// A renderer together with what it draws from.
@@ -124,20 +153,29 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
 }
 
 PicturePair::PicturePair(const Picture& a, const Picture& b) {
-    if (a.isLinear() && b.isLinear()) {
+    linear_ = a.isLinear() && b.isLinear();
+    if (linear_) {
         first_ = &a.linear;
         second_ = &b.linear;
-    } else if (!a.isLinear() && !b.isLinear() && !(a.fine.empty() && b.fine.empty())) {
-        const auto floats = [&](const Picture& picture) {
+    } else if (!(a.fine.empty() && b.fine.empty())) {
+        const auto codes = [&](const Picture& picture) {
             if (!picture.fine.empty()) return &picture.fine;
-            spread_ = RgbaFloatImage(picture.coded.width(), picture.coded.height());
-            for (std::size_t i = 0; i < spread_.count(); ++i)
-                spread_.data()[i] = glm::vec4(picture.coded.data()[i]) / 255.0f;
-            return &std::as_const(spread_);
+            made_ = picture.isLinear() ? codes16From(picture.linear) : spread(picture.coded);
+            return &std::as_const(made_);
         };
-        first_ = floats(a);
-        second_ = floats(b);
+        first_ = codes(a);
+        second_ = codes(b);
     }
+}
+
+CompareSettings PicturePair::settings(CompareSettings asked) const {
+    if (linear_)
+        for (int c = 0; c < 3; ++c) asked.background[c] = linearFromSrgb(asked.background[c]);
+    return asked;
+}
+
+double inCodes16(double difference) {
+    return std::round(100 * kWhite16 * difference) / 100;
 }
 
 Picture pictureOf(const Frame& frame, const std::optional<glm::vec3>& background) {
@@ -156,18 +194,26 @@ Result<void> save(const Frame& frame, const std::filesystem::path& target,
     file.jpegQuality = options.jpegQuality;
     file.noClobber = options.noClobber;
     file.camera = options.camera;
+    file.origin = options.origin;
     return writeFrame(frame, target, file);
 }
 
 Result<Comparison> compare(const Picture& a, const Picture& b, const CompareSettings& settings,
                            Job& job) {
-    if (a.isLinear() != b.isLinear())
-        job.note("one picture is linear float, the other 8-bit: both are compared as 8-bit sRGB");
-    const PicturePair floats(a, b);
-    if (!floats.first()) return compare(a.coded, b.coded, settings);
-    STX_TRY(auto found, compare(*floats.first(), *floats.second(), settings));
-    // In codes of 16 bits; a hundredth of one is rounding.
-    if (!a.isLinear()) found.worst.difference = std::round(6553500 * found.worst.difference) / 100;
+    const PicturePair pair(a, b);
+    if (a.isLinear() != b.isLinear()) {
+        const int bits = pair.codes16() ? 16 : 8;
+        job.note(fmt::format(
+            "one picture is linear float, the other {}-bit: both are compared as {}-bit sRGB", bits,
+            bits));
+    }
+    const CompareSettings own = pair.settings(settings);
+    if (!pair.first()) return compare(a.coded, b.coded, own);
+    STX_TRY(auto found, compare(*pair.first(), *pair.second(), own));
+    if (pair.codes16()) {
+        found.worst.difference = inCodes16(found.worst.difference);
+        found.white = kWhite16;
+    }
     return found;
 }
 

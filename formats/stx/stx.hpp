@@ -248,9 +248,9 @@ struct Picture {
     [[nodiscard]] bool isLinear() const { return !linear.empty(); }
 };
 
-/// Two pictures as they are compared: as floats when both are linear, or one is of 16 bits and none
-/// is linear (`fine`, the other one's 8 bits spread to 0..1); else by their coded values, and both
-/// are null. They must outlive this.
+/// Two pictures as they are compared: as floats when both are linear; by codes of 16 bits, as
+/// floats of 0..1, when one is of 16 bits (`fine`, the other one's 8 bits spread, and linear light
+/// coded as sRGB); else by those of 8 bits, and both are null. They must outlive this.
 class PicturePair {
   public:
     PicturePair(const Picture& a, const Picture& b);
@@ -258,11 +258,19 @@ class PicturePair {
     PicturePair& operator=(const PicturePair&) = delete;
     [[nodiscard]] const RgbaFloatImage* first() const { return first_; }
     [[nodiscard]] const RgbaFloatImage* second() const { return second_; }
+    /// Settings for the floats, or the codes, of those whose background is sRGB-coded.
+    [[nodiscard]] CompareSettings settings(CompareSettings asked) const;
+    /// Whether codes of 16 bits are compared: differences of the floats are for inCodes16().
+    [[nodiscard]] bool codes16() const { return first_ && !linear_; }
 
   private:
     const RgbaFloatImage *first_ = nullptr, *second_ = nullptr;
-    RgbaFloatImage spread_;
+    RgbaFloatImage made_;
+    bool linear_ = false;
 };
+
+/// A difference of floats of 0..1 in codes of 16 bits; a hundredth of one is rounding.
+[[nodiscard]] double inCodes16(double difference);
 
 /// Opens a picture of any format that the codecs know (PNG, JPEG, TIFF, OpenEXR, ...), and of HEIC
 /// without its depth; turned upright, as the EXIF of a JPEG, PNG or HEIC says. OpenEXR is its
@@ -281,6 +289,7 @@ struct PictureOptions {
     int jpegQuality = 92;            ///< 1..100
     bool noClobber = false;          ///< error (io) when the target exists
     std::optional<Camera> camera{};  ///< OpenEXR: goes into its standard attributes
+    glm::dvec3 origin{0.0};          ///< OpenEXR: what the camera counts from, as originOf() says
 };
 
 /// Writes a picture, whole or not at all, as .png or .jpg (8-bit sRGB) or .exr (linear, with depth,
@@ -290,8 +299,9 @@ struct PictureOptions {
                                 const PictureOptions& options, Job& job);
 
 /// PSNR, SSIM and the worst pixel of two pictures of one size, as PicturePair says, with a note
-/// when only one is linear; of 16 bits the worst pixel is in their codes. Pictures in memory:
-/// compare() of two images. Errors: invalidInput when sizes disagree or the mask leaves nothing.
+/// when only one is linear; of 16 bits the worst pixel is in their codes. The background is
+/// sRGB-coded, as that of PictureOptions. Pictures in memory: compare() of two images. Errors:
+/// invalidInput when sizes disagree or the mask leaves nothing.
 [[nodiscard]] Result<Comparison> compare(const Picture& a, const Picture& b,
                                          const CompareSettings& settings, Job& job);
 

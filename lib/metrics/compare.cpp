@@ -25,13 +25,15 @@ double peakOf(const Image<glm::vec4>&, const CompareSettings& s) {
     return s.peak;
 }
 
-Result<void> checkFinite(const Image<glm::u8vec4>&, const char*) {
+Result<void> checkFinite(const Image<glm::u8vec4>&, const CompareSettings&, const char*) {
     return {};
 }
-Result<void> checkFinite(const Image<glm::vec4>& image, const char* name) {
+Result<void> checkFinite(const Image<glm::vec4>& image, const CompareSettings& settings,
+                         const char* name) {
     for (int y = 0; y < image.height(); ++y) {
         for (int x = 0; x < image.width(); ++x) {
             const auto& c = image.at(x, y);
+            if (!settings.counts(x, y)) continue;
             if (std::isfinite(c.r) && std::isfinite(c.g) && std::isfinite(c.b) &&
                 std::isfinite(c.a))
                 continue;
@@ -57,13 +59,9 @@ Result<void> checkInputs(const Image<P>& a, const Image<P>& b, const CompareSett
                     settings.mask->width(), settings.mask->height(), a.width(), a.height());
     if (!(peakOf(a, settings) > 0) || !std::isfinite(peakOf(a, settings)))
         return fail(ErrorCode::usage, "the peak is {:g}; it must be above 0", settings.peak);
-    STX_CHECK(checkFinite(a, "first"));
-    STX_CHECK(checkFinite(b, "second"));
+    STX_CHECK(checkFinite(a, settings, "first"));
+    STX_CHECK(checkFinite(b, settings, "second"));
     return {};
-}
-
-bool counts(const CompareSettings& settings, int x, int y) {
-    return !settings.mask || settings.mask->at(x, y) >= 128;
 }
 
 struct RowSums {
@@ -92,7 +90,7 @@ Result<Comparison> compareImages(const Image<P>& a, const Image<P>& b,
             const double ya = luma(ca), yb = luma(cb);
             lumaA.at(x, y) = static_cast<float>(ya);
             lumaB.at(x, y) = static_cast<float>(yb);
-            if (!counts(settings, x, y)) continue;
+            if (!settings.counts(x, y)) continue;
             ++sums.pixels;
             const glm::dvec3 d = glm::abs(glm::dvec3(ca) - glm::dvec3(cb));
             const double largest = std::max({d.r, d.g, d.b});
@@ -116,6 +114,7 @@ Result<Comparison> compareImages(const Image<P>& a, const Image<P>& b,
     out.pixels = all.pixels;
     out.differentPixels = all.different;
     out.worst = all.worst;
+    out.white = peak;
     out.psnrRgb = decibels(all.rgb, 3.0 * all.pixels, peak);
     // Rounding of the two lumas alone must not make a difference.
     out.psnrY =
@@ -132,7 +131,7 @@ Result<Image<glm::u8vec4>> errorImage(const Image<P>& a, const Image<P>& b,
     Image<glm::u8vec4> out(a.width(), a.height());
     parallelFor(0, a.height(), kRowsPerTask, [&](int y) {
         for (int x = 0; x < a.width(); ++x) {
-            if (!counts(settings, x, y)) {
+            if (!settings.counts(x, y)) {
                 out.at(x, y) = {0, 0, 64, 255};
                 continue;
             }
@@ -172,15 +171,17 @@ Result<Image<glm::u8vec4>> errorPicture(const Image<glm::vec4>& a, const Image<g
 
 void SequenceComparison::add(const Comparison& frame) {
     const auto squared = [&](const std::optional<double>& dB, double values) {
-        return dB ? values * peak_ * peak_ / std::pow(10.0, *dB / 10.0) : 0.0;
+        return dB ? values / std::pow(10.0, *dB / 10.0) : 0.0;
     };
     squaredRgb_ += squared(frame.psnrRgb, 3.0 * frame.pixels);
     squaredY_ += squared(frame.psnrY, static_cast<double>(frame.pixels));
     ssim_ += frame.ssimY;
     total_.pixels += frame.pixels;
     total_.differentPixels += frame.differentPixels;
-    if (frames_ == 0 || frame.worst.difference > total_.worst.difference) {
+    if (frames_ == 0 ||
+        frame.worst.difference * total_.white > total_.worst.difference * frame.white) {
         total_.worst = frame.worst;
+        total_.white = frame.white;
         worstFrame_ = frames_;
     }
     ++frames_;
@@ -188,8 +189,8 @@ void SequenceComparison::add(const Comparison& frame) {
 
 Comparison SequenceComparison::total() const {
     Comparison out = total_;
-    out.psnrRgb = decibels(squaredRgb_, 3.0 * out.pixels, peak_);
-    out.psnrY = decibels(squaredY_, static_cast<double>(out.pixels), peak_);
+    out.psnrRgb = decibels(squaredRgb_, 3.0 * out.pixels, 1.0);
+    out.psnrY = decibels(squaredY_, static_cast<double>(out.pixels), 1.0);
     out.ssimY = frames_ ? ssim_ / frames_ : 1.0;
     return out;
 }

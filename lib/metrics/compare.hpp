@@ -13,6 +13,7 @@ namespace stx {
 /// How two pictures are compared.
 struct CompareSettings {
     /// Only pixels of the mask that are >= 128 count. Null: all pixels. Same size as the pictures.
+    /// The others are not looked at, by windows and as neighbours neither: they may be NaN.
     const Image<std::uint8_t>* mask = nullptr;
     /// What both pictures are laid over first where their alpha is below full: colours of 0..1 in
     /// the pictures' own coding. Alpha itself is not compared: what nobody sees is not a
@@ -20,6 +21,8 @@ struct CompareSettings {
     glm::vec3 background{0.0f};
     /// Float pictures: the value that counts as full white. 8-bit pictures: always 255.
     double peak = 1.0;
+
+    [[nodiscard]] bool counts(int x, int y) const { return !mask || mask->at(x, y) >= 128; }
 };
 
 /// The pixel with the largest difference in one channel (the first in reading order of equals).
@@ -36,9 +39,10 @@ struct Comparison {
     std::optional<double> psnrY;
     /// Mean structural similarity of Y, at most 1 (Wang, Bovik, Sheikh, Simoncelli 2004: Gaussian
     /// window 11x11, sigma 1.5, K1 = 0.01, K2 = 0.03). As there, only windows wholly inside the
-    /// picture count, unless none is; with a mask those whose centre is in it.
+    /// picture count, unless none is; with a mask those whose centre is in it, cut at its border.
     double ssimY = 1.0;
     WorstPixel worst;
+    double white = 255.0;              ///< full white in the values that `worst` is in
     std::int64_t pixels = 0;           ///< that counted
     std::int64_t differentPixels = 0;  ///< of these, with any difference in R, G or B
 
@@ -49,8 +53,8 @@ struct Comparison {
 /// on any number of threads. Errors when sizes disagree or nothing is left to compare.
 [[nodiscard]] Result<Comparison> compare(const Image<glm::u8vec4>& a, const Image<glm::u8vec4>& b,
                                          const CompareSettings& settings = {});
-/// The same of float pictures with straight alpha. Errors also on NaN and infinite values, and on a
-/// peak that is not positive.
+/// The same of float pictures with straight alpha. Errors also on NaN and infinite values that
+/// count, and on a peak that is not positive.
 [[nodiscard]] Result<Comparison> compare(const Image<glm::vec4>& a, const Image<glm::vec4>& b,
                                          const CompareSettings& settings = {});
 
@@ -70,19 +74,18 @@ struct Comparison {
 /// frames gives the PSNR (not the mean of decibels), SSIM is the mean over frames.
 class SequenceComparison {
   public:
-    /// `peak` as in compare(); 255 for 8-bit frames.
-    explicit SequenceComparison(double peak) : peak_(peak) {}
     void add(const Comparison& frame);
-    /// Figures of all frames so far; `worst` is the worst pixel of any.
+    /// Figures of all frames so far; `worst` is that of the frame whose is the largest part of
+    /// white, in that frame's values.
     [[nodiscard]] Comparison total() const;
     /// Index of the frame that holds the worst pixel.
     [[nodiscard]] int worstFrame() const { return worstFrame_; }
     [[nodiscard]] int frames() const { return frames_; }
 
   private:
-    double peak_;
     int frames_ = 0;
     int worstFrame_ = 0;
+    /// With white as 1.
     double squaredRgb_ = 0, squaredY_ = 0, ssim_ = 0;
     Comparison total_;
 };

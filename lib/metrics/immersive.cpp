@@ -16,7 +16,7 @@ constexpr int kReach = 2;                          ///< B of IV-PSNR: 5x5 pixels
 constexpr double kUnnoticed = 0.01;                ///< MUD, of white
 constexpr std::array<double, 3> kCounts{4, 1, 1};  ///< of Y, Cb, Cr
 
-/// Y, Cb and Cr of a picture, white as 1.
+/// Y, Cb and Cr of a picture, white as 1; of pixels that do not count infinite, like none.
 using Planes = std::array<Image<float>, 3>;
 
 template <class P>
@@ -25,6 +25,10 @@ Planes planesOf(const Image<P>& picture, const CompareSettings& settings, double
     planes.fill(Image<float>(picture.width(), picture.height()));
     parallelFor(0, picture.height(), [&](int y) {
         for (int x = 0; x < picture.width(); ++x) {
+            if (!settings.counts(x, y)) {
+                for (auto& plane : planes) plane.at(x, y) = std::numeric_limits<float>::infinity();
+                continue;
+            }
             const glm::dvec3 c =
                 glm::dvec3(metrics::seenPixel(picture.at(x, y), settings.background)) / peak;
             const double luma = 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b;
@@ -34,10 +38,6 @@ Planes planesOf(const Image<P>& picture, const CompareSettings& settings, double
         }
     });
     return planes;
-}
-
-bool within(const CompareSettings& settings, int x, int y) {
-    return settings.mask == nullptr || settings.mask->at(x, y) >= 128;
 }
 
 /// The sum over the pixels that count of the squared difference to the likest neighbour.
@@ -61,7 +61,7 @@ double likestSum(const Image<float>& from, const Image<float>& to, float shift,
         }
         double sum = 0;
         for (int x = 0; x < width; ++x)
-            if (within(settings, x, y)) sum += static_cast<double>(best[x]);
+            if (settings.counts(x, y)) sum += static_cast<double>(best[x]);
         rows[y] = sum;
     });
     double sum = 0;
@@ -82,7 +82,7 @@ void ImmersiveComparison::addPair(const Image<P>& a, const Image<P>& b,
         // Of the row's centre, with the poles at the picture's upper and lower edge.
         const double weight = std::cos((y + 0.5 - height / 2.0) * std::numbers::pi / height);
         for (int x = 0; x < width; ++x) {
-            if (!within(settings, x, y)) continue;
+            if (!settings.counts(x, y)) continue;
             ++pixels;
             for (std::size_t c = 0; c < 3; ++c) {
                 const double d = static_cast<double>(second[c].at(x, y)) -

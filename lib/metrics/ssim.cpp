@@ -27,12 +27,13 @@ Window gaussianWindow() {
     return w;
 }
 
-// Weighted sums over a window: a, b, a*a, b*b, a*b.
-using Moments = std::array<double, 5>;
+// Weighted sums over a window: a, b, a*a, b*b, a*b, and the weights.
+using Moments = std::array<double, 6>;
 
 }  // namespace
 
-Image<float> ssimMap(const Image<float>& a, const Image<float>& b, double peak) {
+Image<float> ssimMap(const Image<float>& a, const Image<float>& b, double peak,
+                     const Image<std::uint8_t>* mask) {
     const Window window = gaussianWindow();
     const double c1 = (0.01 * peak) * (0.01 * peak);
     const double c2 = (0.03 * peak) * (0.03 * peak);
@@ -42,13 +43,12 @@ Image<float> ssimMap(const Image<float>& a, const Image<float>& b, double peak) 
         std::vector<Moments> column(width);
         for (int y = static_cast<int>(from); y < to; ++y) {
             const int y0 = std::max(0, y - kRadius), y1 = std::min(height - 1, y + kRadius);
-            double weightY = 0;
             std::fill(column.begin(), column.end(), Moments{});
             for (int v = y0; v <= y1; ++v) {
                 const double w = window[v - y + kRadius];
-                weightY += w;
                 const auto rowA = a.row(v), rowB = b.row(v);
                 for (int x = 0; x < width; ++x) {
+                    if (mask && mask->at(x, v) < 128) continue;
                     const double pa = rowA[x], pb = rowB[x];
                     auto& m = column[x];
                     m[0] += w * pa;
@@ -56,18 +56,21 @@ Image<float> ssimMap(const Image<float>& a, const Image<float>& b, double peak) 
                     m[2] += w * pa * pa;
                     m[3] += w * pb * pb;
                     m[4] += w * pa * pb;
+                    m[5] += w;
                 }
             }
             for (int x = 0; x < width; ++x) {
                 const int x0 = std::max(0, x - kRadius), x1 = std::min(width - 1, x + kRadius);
+                if (mask && mask->at(x, y) < 128) {
+                    out.at(x, y) = 1.0f;
+                    continue;
+                }
                 Moments m{};
-                double weight = 0;
                 for (int u = x0; u <= x1; ++u) {
                     const double w = window[u - x + kRadius];
-                    weight += w;
-                    for (int k = 0; k < 5; ++k) m[k] += w * column[u][k];
+                    for (std::size_t k = 0; k < m.size(); ++k) m[k] += w * column[u][k];
                 }
-                for (auto& v : m) v /= weight * weightY;
+                for (std::size_t k = 0; k + 1 < m.size(); ++k) m[k] /= m.back();
                 const double varA = m[2] - m[0] * m[0], varB = m[3] - m[1] * m[1];
                 const double cov = m[4] - m[0] * m[1];
                 out.at(x, y) =
@@ -81,7 +84,7 @@ Image<float> ssimMap(const Image<float>& a, const Image<float>& b, double peak) 
 
 double meanSsim(const Image<float>& a, const Image<float>& b, double peak,
                 const Image<std::uint8_t>* mask) {
-    const Image<float> map = ssimMap(a, b, peak);
+    const Image<float> map = ssimMap(a, b, peak, mask);
     const auto mean = [&](int border) -> std::pair<double, std::int64_t> {
         double sum = 0;
         std::int64_t n = 0;

@@ -9,7 +9,10 @@ namespace stx {
 
 template <class P>
 void Steadiness::addFrame(const Image<P>& picture, const Image<P>& truth,
-                          const CompareSettings& settings) {
+                          const CompareSettings& settings, double white) {
+    if (frames_ == 0) firstWhite_ = white_ = white;
+    const auto before = static_cast<float>(white / white_);
+    white_ = white;
     const bool follows = error_.size() == picture.size();
     if (!follows) error_ = Image<glm::vec3>(picture.width(), picture.height());
     // Rows are added up in their order, so that the sum is the same on any number of threads.
@@ -21,9 +24,9 @@ void Steadiness::addFrame(const Image<P>& picture, const Image<P>& truth,
         for (int x = 0; x < picture.width(); ++x) {
             const glm::vec3 error = metrics::seenPixel(picture.at(x, y), settings.background) -
                                     metrics::seenPixel(truth.at(x, y), settings.background);
-            const glm::vec3 change = glm::abs(error - error_.at(x, y));
+            const glm::vec3 change = glm::abs(error - before * error_.at(x, y));
             error_.at(x, y) = error;
-            if (settings.mask && settings.mask->at(x, y) < 128) continue;
+            if (!settings.counts(x, y)) continue;
             sums[at] += change.r + change.g + change.b;
             ++counts[at];
         }
@@ -36,7 +39,8 @@ void Steadiness::addFrame(const Image<P>& picture, const Image<P>& truth,
         sum += sums[i];
         count += counts[i];
     }
-    const double mean = count > 0 ? sum / (3.0 * static_cast<double>(count)) : 0.0;
+    const double mean =
+        count > 0 ? sum / (3.0 * static_cast<double>(count)) * (firstWhite_ / white) : 0.0;
     ++steps_;
     sum_ += mean;
     if (steps_ > 1 && mean <= worst_) return;
@@ -46,12 +50,12 @@ void Steadiness::addFrame(const Image<P>& picture, const Image<P>& truth,
 
 void Steadiness::add(const Image<glm::u8vec4>& picture, const Image<glm::u8vec4>& truth,
                      const CompareSettings& settings) {
-    addFrame(picture, truth, settings);
+    addFrame(picture, truth, settings, 255.0);
 }
 
 void Steadiness::add(const Image<glm::vec4>& picture, const Image<glm::vec4>& truth,
                      const CompareSettings& settings) {
-    addFrame(picture, truth, settings);
+    addFrame(picture, truth, settings, settings.peak);
 }
 
 }  // namespace stx

@@ -22,7 +22,7 @@ class Steadiness {
     /// Steps between frames so far; the figures below mean nothing before there is one.
     [[nodiscard]] int steps() const { return steps_; }
     /// Mean over the steps of |change of the picture - change of the truth|, averaged over R, G, B
-    /// and the pixels that count, in the pictures' own values: 0..255 for 8 bits.
+    /// and the pixels that count, in the first picture's own values: 0..255 for 8 bits.
     [[nodiscard]] double mean() const { return steps_ > 0 ? sum_ / steps_ : 0.0; }
     /// The largest of them.
     [[nodiscard]] double worst() const { return worst_; }
@@ -31,9 +31,11 @@ class Steadiness {
 
   private:
     template <class P>
-    void addFrame(const Image<P>& picture, const Image<P>& truth, const CompareSettings& settings);
+    void addFrame(const Image<P>& picture, const Image<P>& truth, const CompareSettings& settings,
+                  double white);
 
-    Image<glm::vec3> error_;  ///< of the frame before
+    Image<glm::vec3> error_;                 ///< of the frame before, in its values
+    double white_ = 1.0, firstWhite_ = 1.0;  ///< of the frame before, of the first one
     int frames_ = 0, steps_ = 0, worstFrame_ = 0;
     double sum_ = 0, worst_ = 0;
 };

@@ -38,7 +38,7 @@ inline constexpr PeakMemory kBake = {"baking", 36, 24};  // the vectors that it 
 inline constexpr PeakMemory kBakeToMpeg4 = {"baking into MPEG-4", 76};
 inline constexpr PeakMemory kBackground = {"a background", 32};
 inline constexpr PeakMemory kCompared = {"two pictures that are compared", 36};
-inline constexpr PeakMemory kComparedLinear = {"two pictures that are compared", 76};
+inline constexpr PeakMemory kComparedLinear = {"two pictures that are compared", 80};
 inline constexpr PeakMemory kExport = {"writing pictures", 0, 16};
 inline constexpr PeakMemory kFewerSplats = {"merging splats", 140};
 // Beyond surfaces it is checked by what they have: kPerTriangle, and kPerPixelOfTriangles.

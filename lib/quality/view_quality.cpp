@@ -64,7 +64,7 @@ ViewQuality ViewQuality::of(std::span<const ReferenceView> views) {
 }
 
 Result<ViewQuality::Psnr> ViewQuality::measure(Renderer& renderer, const Job& job) const {
-    SequenceComparison all(255.0);
+    SequenceComparison all;
     Psnr psnr{kIdentical, kIdentical};
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
         STX_TRY(const auto picture, drawn(renderer, cameras_[i], job));

@@ -97,7 +97,7 @@ Result<Sheet> sheetOf(const std::vector<SheetPair>& pairs, const SheetSettings& 
     content.headerLines = 2;
     content.what = "pairs";
     STX_TRY(const auto plan, planSheet(content, settings, job.limits));
-    SequenceComparison total(255.0);
+    SequenceComparison total;
     std::vector<SheetGroup> groups;
     // Every pair counts in the figure, also when not all are shown.
     int next = 0;

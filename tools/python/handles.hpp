@@ -43,6 +43,7 @@ struct Film {
 struct DrawnFrame {
     std::shared_ptr<const Frame> frame;
     Camera camera;
+    glm::dvec3 origin;  ///< what the camera counts from
 };
 
 void bindCamera(py::module_& module);

@@ -16,6 +16,7 @@ struct Drawer {
     Job job;
     std::mutex mutex;
     std::unique_ptr<Renderer> renderer;
+    glm::dvec3 origin{0.0};  ///< the model's
 };
 using DrawerPointer = std::shared_ptr<Drawer>;
 
@@ -29,6 +30,7 @@ DrawerPointer makeDrawer(const AnyModel& model, const py::dict& keywords, JobHan
     if (const auto file = given.find("environment"); file && !py::isinstance<py::bool_>(*file))
         given.take("environment", environment);
     auto drawer = std::make_shared<Drawer>();
+    drawer->origin = originOf(*model.model);
     if (handle) drawer->job.limits = handle->job.limits;
     drawer->renderer = runFor(drawer->job, handle, [&]() -> Result<std::unique_ptr<Renderer>> {
         Job& job = drawer->job;
@@ -52,7 +54,7 @@ DrawnFrame draw(const DrawerPointer& drawer, const Camera& camera,
         if (next) drawer->renderer->expect(*next);
         return drawer->renderer->render(camera);
     });
-    return {std::make_shared<const Frame>(std::move(frame)), camera};
+    return {std::make_shared<const Frame>(std::move(frame)), camera, drawer->origin};
 }
 
 std::optional<glm::vec3> behind(const py::object& background) {
@@ -71,6 +73,7 @@ void saveFrame(const DrawnFrame& drawn, const Path& path, const py::object& back
     options.jpegQuality = quality;
     options.noClobber = noClobber;
     options.camera = drawn.camera;
+    options.origin = drawn.origin;
     if (quality < 1 || quality > 100) refuse("quality is {}; 1 to 100 is expected", quality);
     run(job, [&](Job& part) { return save(*drawn.frame, path, options, part); });
 }

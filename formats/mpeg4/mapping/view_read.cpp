@@ -88,9 +88,19 @@ Result<std::vector<ReferenceView>> ViewReader::header(const ViewPlan& plan) cons
     }
     const NodePtr& depth = plan.texture->get<NodePtr>("depth");
     const NodePtr& colour = plan.texture->get<NodePtr>("texture");
+    if (plan.octree && !colour)
+        return fail(ErrorCode::invalidInput, "an image of an OctreeImage has no texture");
     STX_TRY(const auto info, images_.probe(depth && !plan.octree ? *depth : *colour));
     STX_TRY(auto view, cameraOf(plan, info.width, info.height));
-    if (!plan.octree) view.depthBits = info.bits;
+    if (!plan.octree) {
+        view.depthBits = info.bits;
+        return std::vector<ReferenceView>{view};
+    }
+    // Its planes and where its camera is follow from the voxels that it sees.
+    const auto pixels = static_cast<std::uint64_t>(info.width) * info.height;
+    STX_CHECK(job_.limits.checkAllocation(pixels, 12, "a view of the octree"));
+    STX_CHECK(castOctree(*plan.octree, view));
+    view.depth = {};
     return std::vector<ReferenceView>{view};
 }
 

@@ -33,7 +33,8 @@ class ViewReader {
     /// The view; of a PointTexture one for each of its layers. Errors (invalidInput) say what is
     /// wrong, without the view's name.
     [[nodiscard]] Result<std::vector<ReferenceView>> read(const ViewPlan& plan) const;
-    /// The same without images: size and depth bits from the image's header.
+    /// The same without images: size and depth bits from the image's header, and planes of an
+    /// octree from its voxels.
     [[nodiscard]] Result<std::vector<ReferenceView>> header(const ViewPlan& plan) const;
     /// Which images read() will give, where that and header() are sure before it; nothing of what
     /// only pixels tell.

@@ -124,6 +124,23 @@ TEST(Compare, FloatPicturesUseTheStatedPeak) {
     EXPECT_NE(error.error().message.find("(2, 3)"), std::string::npos);
 }
 
+TEST(Compare, WhatTheMaskLeavesOutMayBeNoNumber) {
+    const Image<glm::vec4> a(24, 24, glm::vec4(0.2f, 0.4f, 0.6f, 1)),
+        b(24, 24, glm::vec4(0.3f, 0.4f, 0.6f, 1));
+    auto bad = a;
+    bad.at(12, 12) = glm::vec4(std::numeric_limits<float>::quiet_NaN());
+    Image<std::uint8_t> mask(24, 24, 255);
+    mask.at(12, 12) = 0;
+    CompareSettings settings;
+    settings.mask = &mask;
+    const auto good = compare(a, b, settings), masked = compare(bad, b, settings);
+    ASSERT_TRUE(good && masked);
+    EXPECT_EQ(*masked->psnrRgb, *good->psnrRgb);
+    EXPECT_EQ(masked->ssimY, good->ssimY);
+    EXPECT_EQ(masked->pixels, 24 * 24 - 1);
+    EXPECT_FALSE(compare(bad, b));
+}
+
 TEST(Compare, SizesMustMatch) {
     EXPECT_FALSE(compare(Picture(4, 4), Picture(4, 5)));
     EXPECT_FALSE(compare(Picture(), Picture()));
@@ -131,7 +148,7 @@ TEST(Compare, SizesMustMatch) {
 
 TEST(Compare, ASequenceAddsSquaredErrors) {
     const Picture a(16, 16, {0, 0, 0, 255}), b(16, 16, {10, 10, 10, 255});
-    SequenceComparison sequence(255.0);
+    SequenceComparison sequence;
     sequence.add(*compare(a, a));
     sequence.add(*compare(a, b));
     const auto total = sequence.total();
@@ -139,6 +156,23 @@ TEST(Compare, ASequenceAddsSquaredErrors) {
     EXPECT_EQ(sequence.worstFrame(), 1);
     EXPECT_EQ(total.worst.difference, 10.0);
     EXPECT_EQ(total.pixels, 512);
+}
+
+TEST(Compare, TheWorstPixelOfASequenceIsTheLargestPartOfWhite) {
+    Comparison coded, codes16, linear;
+    coded.worst = {1, 2, 179};
+    codes16.worst = {3, 4, 327};
+    codes16.white = 65535;
+    linear.worst = {5, 6, 0.69};
+    linear.white = 1;
+    SequenceComparison sequence;
+    for (const Comparison& frame : {codes16, coded, linear}) sequence.add(frame);
+    EXPECT_EQ(sequence.worstFrame(), 1);
+    EXPECT_EQ(sequence.total().worst.difference, 179);
+    EXPECT_EQ(sequence.total().white, 255);
+    linear.worst.difference = 0.71;
+    sequence.add(linear);
+    EXPECT_EQ(sequence.worstFrame(), 3);
 }
 
 TEST(Compare, ThreadsDoNotChangeTheResult) {
@@ -201,6 +235,19 @@ TEST(Ssim, AgreesWithItsDefinition) {
         }
     }
     EXPECT_NEAR(meanSsim(a, b, 255, nullptr), mean, 1e-6);
+    // A mask cuts windows as a border does: the right half.
+    Image<float> rightA(12, 20), rightB(12, 20);
+    Image<std::uint8_t> right(24, 20, 0);
+    for (int y = 0; y < 20; ++y)
+        for (int x = 0; x < 12; ++x) {
+            right.at(x + 12, y) = 255;
+            rightA.at(x, y) = a.at(x + 12, y);
+            rightB.at(x, y) = b.at(x + 12, y);
+        }
+    const auto half = ssimMap(rightA, rightB, 255), masked = ssimMap(a, b, 255, &right);
+    for (int y = 0; y < 20; ++y)
+        for (int x = 0; x < 12; ++x) EXPECT_NEAR(masked.at(x + 12, y), half.at(x, y), 1e-6);
+    EXPECT_EQ(masked.at(3, 3), 1.0f);
     EXPECT_GT(mean, 0.3);
     EXPECT_LT(mean, 0.99);
 }

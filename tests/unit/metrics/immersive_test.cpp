@@ -88,6 +88,18 @@ TEST(IvPsnr, CountsPixelsOfTheMask) {
     EXPECT_TRUE(of(a, b).ivPsnr());
 }
 
+TEST(IvPsnr, NeighboursThatTheMaskLeavesOutAreNoLikestOnes) {
+    // The only pixel that is as the middle one is left out.
+    Picture a = greyPicture(9, 9, 50), b = greyPicture(9, 9, 90);
+    b.at(5, 5) = a.at(5, 5);
+    Image<std::uint8_t> mask(9, 9, 255);
+    mask.at(5, 5) = 0;
+    CompareSettings settings;
+    settings.mask = &mask;
+    Picture plain = greyPicture(9, 9, 90);
+    EXPECT_EQ(*of(a, b, settings).ivPsnr(), *of(a, plain, settings).ivPsnr());
+}
+
 TEST(WsPsnr, WeighsRowsByTheSphere) {
     // One row off by 10 in each: the weight of its row over that of all.
     const int height = 16, width = 32;

@@ -47,6 +47,20 @@ TEST(Steadiness, OnlyPixelsOfTheMaskCountAndAlphaIsLaidOverTheBackground) {
     EXPECT_DOUBLE_EQ(s.mean(), 15.0);
 }
 
+TEST(Steadiness, FramesOfAnotherKindAreInTheValuesOfTheFirst) {
+    const Image<glm::vec4> white(4, 3, glm::vec4(1)), black(4, 3, glm::vec4(0, 0, 0, 1));
+    Steadiness s;
+    s.add(grey(255), grey(0), {});
+    s.add(white, black, {});
+    EXPECT_DOUBLE_EQ(s.mean(), 0.0);
+    s.add(black, black, {});
+    EXPECT_DOUBLE_EQ(s.worst(), 255.0);
+    Steadiness floats;
+    floats.add(white, black, {});
+    floats.add(grey(0), grey(0), {});
+    EXPECT_DOUBLE_EQ(floats.worst(), 1.0);
+}
+
 TEST(Steadiness, FramesOfAnotherSizeStartAnew) {
     Steadiness s;
     s.add(grey(0), grey(0), {});

@@ -292,7 +292,8 @@ def compare(a: Path | Frame | ArrayLike, b: Path | Frame | ArrayLike, *, mask: A
     """PSNR, SSIM and the worst pixel of two pictures of one size.
 
     a, b: a file, a Frame (as its PNG), or (height, width, 3 or 4) uint8 (sRGB) or float32 (linear light), straight
-    alpha. As floats when both are, else as 8-bit sRGB. mask: (height, width) bool or uint8: only these pixels count.
-    background: grey or (r, g, b), 0..1, laid behind both. Raises Error: usage, io, invalidInput, unsupported.
+    alpha. As floats when both are, by codes of 16 bits when one is a file of these, else as 8-bit sRGB. mask: (height,
+    width) bool or uint8: only these pixels count. background: grey or (r, g, b), sRGB-coded, 0..1, laid behind both. Raises
+    Error: usage, io, invalidInput, unsupported.
     """
     return _stx.compare(a, b, mask, background, job)
