@@ -60,7 +60,7 @@ Result<void> saveBundle(const Bundle& bundle, const fs::path& target, const Save
 }
 
 Result<void> saveViews(const ViewTable& table, const fs::path& target, const SaveOptions& options,
-                       Job& job) {
+                       Job& job, OutputFiles* together) {
     // Both writers check the bundle: see Bundle::check().
     STX_TRY(const auto container, containerOf(target));
     if (container == FileKind::exr && options.octreeLevels > 0)
@@ -79,7 +79,7 @@ Result<void> saveViews(const ViewTable& table, const fs::path& target, const Sav
                     target.string());
     if (container == FileKind::exr) {
         STX_TRY(const auto summarise, summariesFor(table, options.summaries, job));
-        return writeExrViews(table, target, job, {options.noClobber}, summarise);
+        return writeExrViews(table, target, job, {options.noClobber, together}, summarise);
     }
     return writeMpeg4Views(table, target, job, mpeg4Scene(options), mpeg4Write(options));
 }

@@ -18,9 +18,11 @@ namespace stx {
 [[nodiscard]] Result<void> saveBundle(const Bundle& bundle, const std::filesystem::path& target,
                                       const SaveOptions& options, Job& job);
 
-/// The same bytes of views that are written when they come. Errors: also those of the views.
+/// The same bytes of views that are written when they come; .exr `together` with other files, if
+/// these are given. Errors: also those of the views.
 [[nodiscard]] Result<void> saveViews(const ViewTable& table, const std::filesystem::path& target,
-                                     const SaveOptions& options, Job& job);
+                                     const SaveOptions& options, Job& job,
+                                     OutputFiles* together = nullptr);
 
 /// What of the options is about the scene, and about its file.
 [[nodiscard]] mpeg4::SceneWriteOptions mpeg4Scene(const SaveOptions& options);

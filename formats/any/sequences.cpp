@@ -7,10 +7,12 @@
 #include "formats/any/save.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/files/named_files.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/mapping/sequence_write.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
+#include "lib/model/from_origin.hpp"
 
 namespace stx {
 namespace {
@@ -29,7 +31,7 @@ class NumberedSequence : public Sequence {
   public:
     NumberedSequence(std::vector<NumberedFile> files, bool atlases, Timeline timeline,
                      std::string object, std::optional<FilmBounds> bounds)
-        : files_(std::move(files)), atlases_(atlases), bounds_(bounds) {
+        : files_(std::move(files)), guard_(pathsOf(files_)), atlases_(atlases), bounds_(bounds) {
         open_.object = std::move(object);
         timeline_ = std::move(timeline);
     }
@@ -49,10 +51,19 @@ class NumberedSequence : public Sequence {
     /// What is of the film: when the frame is, and where all of them are, as MPEG-4 has it.
     void tell(Bundle& about, std::size_t index) const {
         setTime(about, index);
-        if (bounds_) about.bounds = bounds_->bounds;
+        if (!bounds_) return;
+        const glm::dvec3 by = bounds_->origin - about.origin;
+        about.bounds = Bounds{bounds_->bounds.min + by, bounds_->bounds.max + by};
+    }
+
+    static std::vector<fs::path> pathsOf(const std::vector<NumberedFile>& files) {
+        std::vector<fs::path> paths;
+        for (const NumberedFile& file : files) paths.push_back(file.path);
+        return paths;
     }
 
     std::vector<NumberedFile> files_;
+    FilesOfFilm guard_;
     bool atlases_;
     std::optional<FilmBounds> bounds_;
     OpenOptions open_;
@@ -91,28 +102,32 @@ struct Shown {
     glm::dvec3 origin{0.0};
     bool noPoints = false;
 };
-Result<Shown> shownOf(const fs::path& path, bool atlas, const Limits& limits) {
+Result<Shown> shownOf(const fs::path& path, bool atlas, const std::string& object,
+                      const Limits& limits) {
     if (!atlas) {
         STX_TRY(const auto header, readExrBundleHeader(path, limits));
         const bool noPoints = std::ranges::all_of(
             header.views, [](const ExrViewHeader& view) { return view.points == 0; });
         return Shown{header.time, header.duration, header.bounds, header.origin, noPoints};
     }
-    STX_TRY(const auto header, readAtlasHeader(path, limits));
+    STX_TRY(auto header, readAtlasHeader(path, limits));
+    // Which of several it is shows when a frame is asked for.
+    if (auto kept = keepObject(header.atlas, object); !kept && !object.empty())
+        return tl::unexpected(kept.error().at(fmt::format("'{}'", path.string())));
     return Shown{header.atlas.time, header.atlas.duration, header.atlas.bounds,
                  header.atlas.origin};
 }
 
-/// All together; none where a header does not tell, or counts from another origin.
+/// All together, from the first one's origin; none where a header does not tell.
 std::optional<FilmBounds> boundsOf(const std::vector<Shown>& shown) {
     FilmBounds film;
     film.origin = shown.front().origin;
     for (const Shown& frame : shown) {
-        if (frame.origin != film.origin) return std::nullopt;
         if (frame.noPoints) continue;
         if (!frame.bounds || frame.bounds->empty()) return std::nullopt;
-        film.bounds.add(frame.bounds->min);
-        film.bounds.add(frame.bounds->max);
+        const glm::dvec3 by = frame.origin - film.origin;
+        film.bounds.add(frame.bounds->min + by);
+        film.bounds.add(frame.bounds->max + by);
     }
     if (film.bounds.empty()) return std::nullopt;
     return film;
@@ -126,7 +141,7 @@ struct UsableFiles {
     bool atlases = false;
 };
 Result<UsableFiles> usableFiles(std::vector<NumberedFile> files, const fs::path& pattern,
-                                bool strict, Job& job) {
+                                const std::string& object, bool strict, Job& job) {
     UsableFiles film;
     std::optional<Error> first;
     const auto all = files.size();
@@ -146,7 +161,8 @@ Result<UsableFiles> usableFiles(std::vector<NumberedFile> files, const fs::path&
         STX_CHECK(job.checkCancelled());
         const auto add = [&]() -> Result<void> {
             STX_TRY(const auto kind, recognise(file.path));
-            STX_TRY(const auto shown, shownOf(file.path, kind == FileKind::atlas, job.limits));
+            STX_TRY(const auto shown,
+                    shownOf(file.path, kind == FileKind::atlas, object, job.limits));
             if (film.files.empty()) film.atlases = kind == FileKind::atlas;
             film.shown.push_back(shown);
             film.files.push_back(std::move(file));
@@ -236,15 +252,52 @@ Result<std::unique_ptr<Sequence>> openSequence(const fs::path& path, const OpenO
 
 Result<NumberedFilm> openNumbered(const fs::path& pattern, const OpenOptions& options, Job& job) {
     STX_TRY(auto all, numberedFiles(pattern.string()));
-    STX_TRY(auto film, usableFiles(std::move(all), pattern, options.set.strict, job));
+    STX_TRY(auto film,
+            usableFiles(std::move(all), pattern, options.object, options.set.strict, job));
     if (!film.atlases) STX_CHECK(checkObject(pattern, FileKind::exr, options));
     STX_TRY(auto line, timelineOf(film, pattern, job));
-    // Those of an atlas are of all its objects.
-    const auto bounds = options.object.empty() ? boundsOf(film.shown) : std::nullopt;
+    const auto bounds = boundsOf(film.shown);
     auto frames = std::make_unique<NumberedSequence>(std::move(film.files), film.atlases,
                                                      std::move(line), options.object, bounds);
-    return NumberedFilm{std::move(frames), bounds};
+    return NumberedFilm{fromOrigin(std::move(frames), film.shown.front().origin), bounds};
 }
+
+namespace {
+
+/// All files appear when all frames are there, and none is one that the frames are read from.
+Result<void> saveNumbered(Sequence& frames, const fs::path& target, const SaveOptions& options,
+                          Job& job) {
+    STX_CHECK(checkPattern(target.string()));
+    // Those that stay are read with the new ones: a film has its pattern for itself.
+    if (const auto older = numberedFiles(target.string()))
+        for (const NumberedFile& file : *older) STX_CHECK(checkIsNotNamed(file.path));
+    // Frames are drawn one after the other, each whole.
+    SaveOptions each = options;
+    each.summaries = SaveOptions::Summaries::none;
+    const std::size_t count = frames.timeline().count();
+    OutputFiles files;
+    const auto add = [&](std::size_t i) -> Result<void> {
+        STX_TRY(const auto table, frames.views(i, job));
+        return saveViews(*table, *frameName(target.string(), static_cast<int>(i)), each, job,
+                         &files);
+    };
+    for (std::size_t i = 0; i < count; ++i) {
+        job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(count),
+                     "writing frames");
+        STX_CHECK(job.checkCancelled());
+        if (const auto added = add(i); !added) {
+            // What is asked for is wrong for all frames, and a single one needs no name.
+            const bool ofFrame = count > 1 && added.error().code != ErrorCode::usage;
+            return tl::unexpected(ofFrame ? added.error().at(frames.timeline().nameOf(i))
+                                          : added.error());
+        }
+    }
+    STX_CHECK(files.commit());
+    noteOlderFiles(target.string(), count, job);
+    return {};
+}
+
+}  // namespace
 
 bool holdsSequences(const fs::path& target) {
     return isNumberedExr(target) || mpeg4ContainerOf(target).has_value();
@@ -258,22 +311,7 @@ Result<void> saveSequence(Sequence& frames, const fs::path& target, const SaveOp
                     "'{}' holds one frame, but there are {}; .mp4, .xmt, .bt and a numbered name "
                     "as in name_%04d.exr hold more",
                     target.string(), count);
-    if (isNumberedExr(target)) {
-        STX_CHECK(checkPattern(target.string()));
-        // Frames are drawn one after the other, each whole.
-        SaveOptions each = options;
-        each.summaries = SaveOptions::Summaries::none;
-        for (std::size_t i = 0; i < count; ++i) {
-            job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(count),
-                         "writing frames");
-            STX_CHECK(job.checkCancelled());
-            STX_TRY(const auto table, frames.views(i, job));
-            STX_CHECK(
-                saveViews(*table, *frameName(target.string(), static_cast<int>(i)), each, job));
-        }
-        noteOlderFiles(target.string(), count, job);
-        return {};
-    }
+    if (isNumberedExr(target)) return saveNumbered(frames, target, options, job);
     if (count == 1) {
         STX_TRY(const auto table, frames.views(0, job));
         return saveViews(*table, target, options, job);

@@ -178,6 +178,8 @@ struct OutputFile::Impl {
     fs::path temporary;   ///< empty when bytes go straight to `fd`
     bool direct = false;  ///< stdout or a device
     bool committed = false;
+    bool waits =
+        false;  ///< whole, as others of OutputFiles are to become: only the name is missing
     std::uint64_t written = 0;
 
     ~Impl() {
@@ -185,6 +187,35 @@ struct OutputFile::Impl {
         if (!temporary.empty()) forgetTarget(temporary);
     }
 };
+
+/// The files wait in a folder, whose lock is theirs: thousands of open files would be too many.
+struct OutputFiles::Impl {
+    std::map<fs::path, Temporary> folders;  ///< by the folder of the files' targets
+    std::vector<OutputFile> files;
+
+    ~Impl() {
+        files.clear();
+        std::error_code ec;
+        for (const auto& folder : folders) fs::remove_all(folder.second.path, ec);
+    }
+    tl::expected<fs::path, int> folderIn(const fs::path& folder) {
+        if (const auto known = folders.find(folder); known != folders.end())
+            return known->second.path;
+        auto made = createTemporaryFolder(folder);
+        if (!made) return tl::unexpected(made.error());
+        return folders.emplace(folder, std::move(*made)).first->second.path;
+    }
+};
+
+OutputFiles::OutputFiles() : impl_(std::make_unique<Impl>()) {}
+OutputFiles::OutputFiles(OutputFiles&&) noexcept = default;
+OutputFiles& OutputFiles::operator=(OutputFiles&&) noexcept = default;
+OutputFiles::~OutputFiles() = default;
+
+Result<void> OutputFiles::commit() {
+    for (OutputFile& file : impl_->files) STX_CHECK(file.commit());
+    return {};
+}
 
 OutputFile::OutputFile(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 OutputFile::OutputFile(OutputFile&&) noexcept = default;
@@ -221,8 +252,13 @@ Result<OutputFile> OutputFile::create(const fs::path& target, Options options) {
     STX_TRY(impl->real, throughLinks(target));
     if (exists && ::access(impl->real.c_str(), W_OK) != 0) return failIo("write", target, errno);
 
-    const fs::path folder = folderOf(impl->real);
+    fs::path folder = folderOf(impl->real);
     removeStaleTemporaries(folder);
+    if (options.together) {
+        auto waiting = options.together->impl_->folderIn(folder);
+        if (!waiting) return failIo("write", target, waiting.error());
+        folder = std::move(*waiting);
+    }
     auto temporary = createTemporaryFile(folder);
     if (!temporary) return failIo("write", target, temporary.error());
     impl->fd = std::move(temporary->fd);
@@ -283,9 +319,15 @@ Result<void> OutputFile::commit() {
     }
     // A full disk may only show here, not by write(). A folder that appears as a whole has its
     // files flushed then.
-    if (!isInTemporaryFolder(f.real) && ::fsync(f.fd.get()) != 0 && errno != EINVAL &&
+    if (!f.waits && !isInTemporaryFolder(f.real) && ::fsync(f.fd.get()) != 0 && errno != EINVAL &&
         errno != ENOTSUP)
         return failIo("write", f.target, errno);
+    if (f.options.together && !f.waits) {
+        if (const int error = f.fd.close()) return failIo("write", f.target, error);
+        f.waits = true;
+        f.options.together->impl_->files.push_back(OutputFile(std::move(impl_)));
+        return {};
+    }
     if (f.options.noClobber) {
         if (const int error = renameNoReplace(f.temporary, f.real)) {
             if (error == EEXIST) return failExists(f.target);
@@ -476,106 +518,6 @@ Result<void> OutputFolder::commitWith(OutputFile& file) {
     auto done = file.commit();
     if (replaces) ::unlink(aside.c_str());
     return done;
-}
-
-namespace {
-
-bool hasScheme(std::string_view name) {
-    const auto colon = name.find(':');
-    if (colon == std::string_view::npos || colon == 0) return false;
-    for (std::size_t i = 0; i < colon; ++i) {
-        const char c = name[i];
-        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-        const bool other = (c >= '0' && c <= '9') || c == '+' || c == '.' || c == '-';
-        if (!letter && (i == 0 || !other)) return false;
-    }
-    return true;
-}
-
-bool isInside(const fs::path& path, const fs::path& folder) {
-    auto p = path.begin();
-    for (auto f = folder.begin(); f != folder.end(); ++f, ++p) {
-        if (f->empty()) continue;
-        if (p == path.end() || *p != *f) return false;
-    }
-    return true;
-}
-
-}  // namespace
-
-namespace {
-
-/// A regular file of this name in `base`, when folders alone lead to it: not up, and through no
-/// link. Sets have tens of thousands of such names, so they are not taken apart as paths.
-std::optional<fs::path> plainFile(const std::string& base, std::string_view name) {
-    std::string at = base;
-    if (!at.ends_with('/')) at += '/';
-    while (true) {
-        const std::size_t end = std::min(name.find('/'), name.size());
-        const std::string_view part = name.substr(0, end);
-        if (part.empty() || part == "." || part == "..") return std::nullopt;
-        at += part;
-        struct stat status {};
-        if (::lstat(at.c_str(), &status) != 0) return std::nullopt;
-        if (end == name.size()) {
-            if (!S_ISREG(status.st_mode)) return std::nullopt;
-            return fs::path(std::move(at));
-        }
-        if (!S_ISDIR(status.st_mode)) return std::nullopt;
-        at += '/';
-        name.remove_prefix(end + 1);
-    }
-}
-
-Result<fs::path> findInside(const fs::path& folder, std::string_view name, const Limits& limits) {
-    const auto refuse = [&](std::string_view why) {
-        return fail(ErrorCode::invalidInput,
-                    "the name '{}' {}; only files in the folder of the file that names them are "
-                    "opened",
-                    name.substr(0, 200), why);
-    };
-    if (name.empty()) return fail(ErrorCode::invalidInput, "a file name is empty");
-    if (name.find('\0') != std::string_view::npos) return refuse("holds a zero byte");
-    if (hasScheme(name)) return refuse("is a URL or has a drive letter");
-
-    std::error_code ec;
-    const fs::path base = folder.empty() ? fs::path(".") : folder;
-    // That of /dev/stdin, where no file is beside what comes in.
-    if (base == "/dev" && fs::path(name).is_relative())
-        return fail(ErrorCode::io,
-                    "'{}' lies beside the file that names it, and standard input has no folder; "
-                    "give that file's name in place of -",
-                    name.substr(0, 200));
-    // Nearly all names are of this kind.
-    if (auto plain = plainFile(base.native(), name)) return *std::move(plain);
-    std::string spelled(name);
-    // Backslashes are separators in files written on Windows, and seldom part of a name here.
-    if (spelled.find('\\') != std::string::npos && !fs::exists(base / spelled, ec))
-        std::replace(spelled.begin(), spelled.end(), '\\', '/');
-    const fs::path relative(spelled);
-    if (!limits.allowOutside) {
-        if (relative.is_absolute()) return refuse("is an absolute path");
-        const fs::path normal = relative.lexically_normal();
-        if (!normal.empty() && *normal.begin() == "..") return refuse("leaves its folder by '..'");
-    }
-    const fs::path joined = base / relative;
-    const fs::path realBase = fs::canonical(base, ec);
-    if (ec) return failIo("open", base, ec.value());
-    const fs::path real = fs::canonical(joined, ec);
-    if (ec) return failIo("open", joined, ec.value());
-    if (!limits.allowOutside && !isInside(real, realBase))
-        return refuse("leads out of its folder by a link");
-    if (!fs::is_regular_file(real, ec)) return refuse("is not a regular file");
-    return joined;
-}
-
-}  // namespace
-
-Result<fs::path> resolveInside(const fs::path& folder, std::string_view name,
-                               const Limits& limits) {
-    auto file = findInside(folder, name, limits);
-    if (file) rememberNamedFile(*file);
-    return file;
 }
 
 }  // namespace stx

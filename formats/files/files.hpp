@@ -21,12 +21,15 @@ using ByteSpan = std::span<const std::byte>;
 /// The error (io) of a FIFO or a device where a file is expected.
 [[nodiscard]] tl::unexpected<Error> notAFile(const std::filesystem::path& path);
 
+class OutputFiles;
+
 /// A file that is written whole or not at all: bytes go to a temporary name beside the target,
 /// commit() flushes and renames. Destroyed without commit(): nothing stays. "-" is stdout.
 class OutputFile {
   public:
     struct Options {
-        bool noClobber = false;  ///< error when the target exists
+        bool noClobber = false;           ///< error when the target exists
+        OutputFiles* together = nullptr;  ///< commit() waits for that of these
     };
     [[nodiscard]] static Result<OutputFile> create(const std::filesystem::path& target,
                                                    Options options);
@@ -47,6 +50,23 @@ class OutputFile {
     friend class OutputFolder;
     struct Impl;
     explicit OutputFile(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+/// Files that appear when all of them are whole, as the frames of a film: each is one of
+/// OutputFile::Options::together. Destroyed without commit(): none does. They are renamed one after
+/// the other: who is killed then leaves some of them, each whole.
+class OutputFiles {
+  public:
+    OutputFiles();
+    OutputFiles(OutputFiles&&) noexcept;
+    OutputFiles& operator=(OutputFiles&&) noexcept;
+    ~OutputFiles();
+    [[nodiscard]] Result<void> commit();
+
+  private:
+    friend class OutputFile;
+    struct Impl;
     std::unique_ptr<Impl> impl_;
 };
 

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -17,10 +18,17 @@ struct NamedFiles {
     std::atomic<bool> guarded = false;
     std::mutex mutex;
     std::set<FileNumber> numbers;
+    std::multiset<FileNumber> ofFilms;
 };
 NamedFiles& namedFiles() {
     static NamedFiles all;
     return all;
+}
+
+std::optional<FileNumber> numberOf(const std::filesystem::path& file) {
+    struct stat status {};
+    if (::stat(file.c_str(), &status) != 0) return std::nullopt;
+    return FileNumber(status.st_dev, status.st_ino);
 }
 
 }  // namespace
@@ -31,22 +39,41 @@ void guardNamedFiles() {
 
 void rememberNamedFile(const std::filesystem::path& file) {
     NamedFiles& all = namedFiles();
-    struct stat status {};
-    if (!all.guarded || ::stat(file.c_str(), &status) != 0) return;
+    if (!all.guarded) return;
+    const auto number = numberOf(file);
+    if (!number) return;
     const std::lock_guard lock(all.mutex);
-    all.numbers.emplace(status.st_dev, status.st_ino);
+    all.numbers.insert(*number);
+}
+
+FilesOfFilm::FilesOfFilm(const std::vector<std::filesystem::path>& files) {
+    NamedFiles& all = namedFiles();
+    for (const auto& file : files)
+        if (const auto number = numberOf(file)) numbers_.push_back(*number);
+    const std::lock_guard lock(all.mutex);
+    all.ofFilms.insert(numbers_.begin(), numbers_.end());
+}
+
+FilesOfFilm::~FilesOfFilm() {
+    NamedFiles& all = namedFiles();
+    const std::lock_guard lock(all.mutex);
+    for (const FileNumber& number : numbers_)
+        if (const auto one = all.ofFilms.find(number); one != all.ofFilms.end())
+            all.ofFilms.erase(one);
 }
 
 Result<void> checkIsNotNamed(const std::filesystem::path& target) {
     NamedFiles& all = namedFiles();
-    struct stat status {};
-    if (!all.guarded || ::stat(target.c_str(), &status) != 0) return {};
+    const auto number = numberOf(target);
+    if (!number) return {};
     const std::lock_guard lock(all.mutex);
-    if (!all.numbers.contains({status.st_dev, status.st_ino})) return {};
+    const bool named = all.numbers.contains(*number);
+    if (!named && !all.ofFilms.contains(*number)) return {};
+    std::error_code ec;
     return fail(ErrorCode::usage,
-                "'{}' is a {} that the input names, which would be lost; give the output another "
-                "name",
-                target.string(), S_ISDIR(status.st_mode) ? "folder" : "file");
+                "'{}' is a {} {}, which would be lost; give the output another name",
+                target.string(), std::filesystem::is_directory(target, ec) ? "folder" : "file",
+                named ? "that the input names" : "of a film that is open");
 }
 
 }  // namespace stx

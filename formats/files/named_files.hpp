@@ -1,6 +1,10 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <filesystem>
+#include <utility>
+#include <vector>
 
 #include "lib/base/result.hpp"
 
@@ -18,7 +22,21 @@ void guardNamedFiles();
 /// pattern, whose files may be folders. From any thread.
 void rememberNamedFile(const std::filesystem::path& file);
 
-/// Errors (usage) where the file or folder that would be replaced is one that an input names.
+/// The files, or folders, of an open film, which are read when their frames are asked for. While
+/// this lives, OutputFile and OutputFolder refuse their names, whatever the program.
+class FilesOfFilm {
+  public:
+    explicit FilesOfFilm(const std::vector<std::filesystem::path>& files);
+    FilesOfFilm(const FilesOfFilm&) = delete;
+    FilesOfFilm& operator=(const FilesOfFilm&) = delete;
+    ~FilesOfFilm();
+
+  private:
+    std::vector<std::pair<dev_t, ino_t>> numbers_;
+};
+
+/// Errors (usage) where the file or folder that would be replaced is one that an input names, or
+/// one of a film that is open.
 [[nodiscard]] Result<void> checkIsNotNamed(const std::filesystem::path& target);
 
 }  // namespace stx

@@ -34,8 +34,7 @@ class FrameExporter {
                           "writing frames");
             STX_CHECK(job_.checkCancelled());
             if (auto done = add(i); !done)
-                return tl::unexpected(done.error().at(
-                    fmt::format("frame {} ({:g} s)", i, frames_.timeline().times[i])));
+                return tl::unexpected(done.error().at(frames_.timeline().nameOf(i)));
         }
         // The first of each camera, by which readers number them: one that starts late keeps its
         // place.

@@ -14,9 +14,14 @@ Result<void> check(const CameraSettings& s) {
         return fail(ErrorCode::usage, "a picture of {}x{} is asked for; sizes are above 0", s.width,
                     s.height);
     if (!(s.fovRad > 0 && s.fovRad < std::numbers::pi))
-        return fail(ErrorCode::usage, "fovRad is {:g}; it must be above 0 and below pi", s.fovRad);
+        return fail(ErrorCode::usage,
+                    "the field of view is {:g} degrees; it must be above 0 and below 180",
+                    glm::degrees(s.fovRad));
     if (!(s.orthoHeight >= 0 && std::isfinite(s.orthoHeight)))
-        return fail(ErrorCode::usage, "orthoHeight is {:g}; it must be 0 or more", s.orthoHeight);
+        return fail(ErrorCode::usage,
+                    "the window of an orthographic camera is {:g} high; above 0, or 0 for a "
+                    "perspective camera, is expected",
+                    s.orthoHeight);
     if (!(glm::length(s.up) > 0))
         return fail(ErrorCode::usage, "up is 0,0,0; it must point somewhere");
     return {};

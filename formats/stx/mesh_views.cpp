@@ -32,8 +32,8 @@ Result<ViewFraming> framingOf(const Mesh& mesh, const ConvertSettings& s, bool c
                     s.width, s.height, limits.maxImageSide);
     if (!(s.fovRad > 0 && s.fovRad < glm::radians(170.0)))
         return fail(ErrorCode::usage,
-                    "fovRad is {:g}; it must be above 0 and below 170 degrees in radians",
-                    s.fovRad);
+                    "the field of view is {:g} degrees; it must be above 0 and below 170",
+                    glm::degrees(s.fovRad));
     if (s.up && !(glm::length(*s.up) > 0))
         return fail(ErrorCode::usage, "up is 0,0,0; it must point somewhere");
     ViewFraming framing;

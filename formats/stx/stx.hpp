@@ -43,6 +43,7 @@
 #include "lib/metrics/compare.hpp"
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
+#include "lib/model/from_origin.hpp"
 #include "lib/model/mesh.hpp"
 #include "lib/model/sequence.hpp"
 #include "lib/packing/packing.hpp"
@@ -88,13 +89,15 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
 [[nodiscard]] Result<std::unique_ptr<Sequence>> openSequence(const std::filesystem::path& path,
                                                              const OpenOptions& options, Job& job);
 
-/// Writes a film, frame by frame in bounded memory: .mp4, .xmt, .bt, or `name_%04d.exr`. One frame
-/// is saved as its bundle. Errors: as those of a bundle; (usage) a target that holds one frame
-/// only, or a name with several numbers.
+/// Writes a film, frame by frame in bounded memory and whole or not at all: .mp4, .xmt, .bt, or
+/// `name_%04d.exr`. One frame is saved as its bundle. Errors: as those of a bundle; (usage) a
+/// target that holds one frame only, a name with several numbers, or the name of a film of numbered
+/// files that is open: these are read when frames are asked for, and nothing replaces them.
 [[nodiscard]] Result<void> save(Sequence& frames, const std::filesystem::path& target,
                                 const SaveOptions& options, Job& job);
 
-// sequenceOf(Bundle), someFrames(frames, numbers), changed(frames, change), and
+// sequenceOf(Bundle), someFrames(frames, numbers), changed(frames, change), fromOrigin(frames,
+// origin), and
 // noteUnusedOptions(), checkFrameOf()         options of open() that do not matter to an input
 // validateFile(path, ValidateOptions, Job&)   every rule that a bundle or an atlas breaks
 // openEnvironment(path, Job&)                 what is far behind a bundle (Bundle::environment);

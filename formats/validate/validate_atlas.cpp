@@ -2,6 +2,7 @@
 
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/validate/findings.hpp"
+#include "lib/model/view_checks.hpp"
 
 namespace stx {
 namespace {
@@ -41,12 +42,14 @@ void checkRectangles(const std::vector<ReferenceView>& views, int pages, glm::iv
     rectangles = std::move(good);
 }
 
-/// Those of views, and 5005.
+/// Those of views, 3009 and 5005.
 void checkHeaders(const Atlas& atlas, Findings& findings) {
     for (std::size_t i = 0; i < atlas.views.size(); ++i)
         checkViewHeader(atlas.views[i], viewText(i, atlas.views[i].name), findings);
     if (const auto ok = checkObjects(atlas.objects, atlas.views.size()); !ok)
         findings.add(5005, "", ok.error().message, "a name and views for each object");
+    else if (const auto named = checkNames(atlas); !named)
+        findings.add(3009, "", named.error().text(), "names that differ");
 }
 
 /// 4030, over the rectangles of each view.

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "formats/validate/findings.hpp"
+#include "lib/model/view_checks.hpp"
 #include "lib/surface/normals.hpp"
 
 namespace stx {
@@ -170,6 +171,8 @@ std::vector<Finding> validate(const Bundle& bundle) {
     std::vector<std::int64_t> points(bundle.views.size());
     for (std::size_t i = 0; i < bundle.views.size(); ++i)
         points[i] = checkWholeView(bundle.views[i], i, found[i]);
+    if (const auto named = checkNames(viewNamesOf(bundle.views)); !named)
+        found.emplace_back().add(3009, "", named.error().message, "names that differ");
     return ofAllViews(found, points);
 }
 

@@ -11,6 +11,7 @@
 #include "lib/model/depth_values.hpp"
 #include "lib/model/splat_cloud.hpp"
 #include "lib/model/strays.hpp"
+#include "lib/model/view_checks.hpp"
 
 namespace stx {
 namespace {
@@ -197,6 +198,8 @@ Result<Subject> subjectOf(const Mesh& whole, const std::vector<Camera>& cameras,
     if (!settings.names.empty() && settings.names.size() != cameras.size())
         return fail(ErrorCode::usage, "there are {} names for {} cameras", settings.names.size(),
                     cameras.size());
+    if (auto named = checkNames({settings.names.begin(), settings.names.end()}); !named)
+        return fail(ErrorCode::usage, "{}", named.error().message);
     for (const auto& c : cameras) STX_CHECK(c.check());
     subject.kinds.normal = settings.meshNormals;
     subject.kinds.metallicRoughness = settings.materials && hasMetallicRoughness(mesh);

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <map>
+#include <span>
+
+#include "lib/model/view_checks.hpp"
 
 namespace stx {
 namespace {
@@ -77,6 +80,15 @@ std::vector<std::pair<std::size_t, PaddedArea>> boxesOf(const Atlas& atlas, std:
     return boxes;
 }
 
+/// Of an atlas or an object.
+template <class Of>
+Result<void> checkPixels(const Of& of) {
+    if (of.sourcePixels >= 0 && of.keptPixels >= 0) return {};
+    return fail(ErrorCode::invalidInput,
+                "sourcePixels is {} and keptPixels {}; 0 or more are expected", of.sourcePixels,
+                of.keptPixels);
+}
+
 }  // namespace
 
 std::vector<std::pair<std::size_t, std::size_t>> findOverlaps(
@@ -149,14 +161,30 @@ bool Atlas::paddingHolds(int texels) const {
     return true;
 }
 
+Result<void> checkNames(const Atlas& atlas) {
+    if (atlas.objects.empty()) return checkNames(viewNamesOf(atlas.views));
+    const std::span<const ReferenceView> views(atlas.views);
+    for (const AtlasObject& o : atlas.objects)
+        STX_CHECK(within(fmt::format("object '{}'", o.name),
+                         checkNames(viewNamesOf(views.subspan(o.firstView, o.views)))));
+    return {};
+}
+
 Result<void> Atlas::check() const {
     if (views.empty()) return fail(ErrorCode::invalidInput, "the atlas has no reference view");
     if (pages.empty()) return fail(ErrorCode::invalidInput, "the atlas has no page");
     if (padding < 0) return fail(ErrorCode::invalidInput, "the atlas' padding is {}", padding);
+    if (layout != "grid" && layout != "tight")
+        return fail(ErrorCode::invalidInput, "the atlas' layout is '{}'; grid or tight is expected",
+                    layout);
+    STX_CHECK(checkPixels(*this));
     STX_CHECK(checkObjects(objects, views.size()));
     for (std::size_t i = 0; i < views.size(); ++i) {
-        STX_CHECK(within(fmt::format("view {}", i), views[i].camera.check()));
+        STX_CHECK(within(fmt::format("view {}", i), checkNumbers(views[i])));
     }
+    for (const AtlasObject& o : objects)
+        STX_CHECK(within(fmt::format("object '{}'", o.name), checkPixels(o)));
+    STX_CHECK(checkNames(*this));
     for (std::size_t i = 0; i < pages.size(); ++i) {
         const auto& p = pages[i];
         const auto same = [&](const auto& image) {
@@ -176,6 +204,7 @@ Result<void> Atlas::check() const {
         STX_CHECK(within(fmt::format("page {}", i), p.texture.check()));
         if (p.texture.isLinear() != pages[0].texture.isLinear())
             return fail(ErrorCode::invalidInput, "page {} has another colour space than page 0", i);
+        STX_CHECK(within(fmt::format("page {}", i), countPoints(p.depth)));
     }
     if (textureCount() > 4)
         return fail(ErrorCode::invalidInput, "the atlas has {} textures; at most 4 are possible",

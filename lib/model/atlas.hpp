@@ -103,8 +103,9 @@ struct Atlas {
     /// Each rectangle has this many texels of padding on each side to itself, or as many as its
     /// view has pixels there. The atlas must pass check().
     [[nodiscard]] bool paddingHolds(int texels) const;
-    /// Errors when a rectangle leaves its view or page, two overlap, sizes disagree, or objects do
-    /// not have all views.
+    /// Errors (invalidInput) when a rectangle leaves its view or page, two overlap, sizes disagree,
+    /// objects do not have all views, two views of a model have one name, or a number, a depth or
+    /// the layout is one that cannot be.
     [[nodiscard]] Result<void> check() const;
 };
 

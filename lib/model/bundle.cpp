@@ -1,9 +1,12 @@
 #include "lib/model/bundle.hpp"
 
 #include <algorithm>
+#include <string_view>
+#include <unordered_set>
 
 #include "lib/base/parallel.hpp"
 #include "lib/model/depth_values.hpp"
+#include "lib/model/view_checks.hpp"
 #include "lib/model/view_table.hpp"
 
 namespace stx {
@@ -20,17 +23,43 @@ std::int64_t ReferenceView::pointCount() const {
 }
 
 Result<std::int64_t> ReferenceView::checkedPointCount() const {
-    const DepthSummary summary = summariseDepth(depth.pixels());
-    if (!summary.wrong) return summary.points;
-    return depthError(*std::ranges::find_if(depth.pixels(), [](float d) { return !(d >= 0); }));
+    return countPoints(depth);
 }
 
 Bounds ReferenceView::computeBounds() const {
     return boundsOfPoints(depth, camera);
 }
 
+Result<std::int64_t> countPoints(const Image<float>& depth) {
+    const DepthSummary summary = summariseDepth(depth.pixels());
+    if (!summary.wrong) return summary.points;
+    return depthError(*std::ranges::find_if(depth.pixels(), [](float d) { return !(d >= 0); }));
+}
+
+Result<void> checkNames(const std::vector<std::string_view>& names) {
+    std::unordered_set<std::string_view> taken;
+    for (const std::string_view name : names)
+        if (!name.empty() && !taken.insert(name).second)
+            return fail(ErrorCode::invalidInput,
+                        "two views have the name '{}'; names are unique in a bundle", name);
+    return {};
+}
+
+Result<void> checkNumbers(const ViewHeader& view) {
+    STX_CHECK(view.camera.check());
+    if (!std::isfinite(view.nearPlane) || !std::isfinite(view.farPlane) || view.nearPlane < 0 ||
+        !(view.nearPlane < view.farPlane))
+        return fail(ErrorCode::invalidInput,
+                    "nearPlane is {:g} and farPlane {:g}; 0 <= nearPlane < farPlane must hold",
+                    view.nearPlane, view.farPlane);
+    if (view.depthBits != 8 && view.depthBits != 16 && view.depthBits != 32)
+        return fail(ErrorCode::invalidInput, "depth has {} bits; 8, 16 or 32 (float) is possible",
+                    view.depthBits);
+    return {};
+}
+
 Result<void> ReferenceView::checkHeader() const {
-    STX_CHECK(camera.check());
+    STX_CHECK(checkNumbers(*this));
     const auto sizeOf = [](const auto& image) {
         return fmt::format("{}x{}", image.width(), image.height());
     };
@@ -46,19 +75,15 @@ Result<void> ReferenceView::checkHeader() const {
         return fail(ErrorCode::invalidInput,
                     "normal is {}, splatU {} and splatV {} but depth is {}; all must match",
                     sizeOf(normal), sizeOf(splatU), sizeOf(splatV), sizeOf(depth));
+    if (splatU.empty() != splatV.empty())
+        return fail(ErrorCode::invalidInput,
+                    "it has {0} without {1}; both axes of the splats, or none, are expected",
+                    splatV.empty() ? "splatU" : "splatV", splatV.empty() ? "splatV" : "splatU");
     if ((!metallicRoughness.empty() && !fits(metallicRoughness)) ||
         (!emissive.empty() && !fits(emissive)))
         return fail(ErrorCode::invalidInput,
                     "metallicRoughness is {} and emissive {} but depth is {}; all must match",
                     sizeOf(metallicRoughness), sizeOf(emissive), sizeOf(depth));
-    if (!std::isfinite(nearPlane) || !std::isfinite(farPlane) || nearPlane < 0 ||
-        !(nearPlane < farPlane))
-        return fail(ErrorCode::invalidInput,
-                    "nearPlane is {:g} and farPlane {:g}; 0 <= nearPlane < farPlane must hold",
-                    nearPlane, farPlane);
-    if (depthBits != 8 && depthBits != 16 && depthBits != 32)
-        return fail(ErrorCode::invalidInput, "depth has {} bits; 8, 16 or 32 (float) is possible",
-                    depthBits);
     return {};
 }
 
@@ -104,7 +129,7 @@ namespace {
 
 using ViewCheck = Result<void> (ReferenceView::*)() const;
 
-Result<void> checkViews(const std::vector<ReferenceView>& views, ViewCheck check) {
+Result<void> checkEach(const std::vector<ReferenceView>& views, ViewCheck check) {
     if (views.empty()) return fail(ErrorCode::invalidInput, "the bundle has no reference view");
     for (std::size_t i = 0; i < views.size(); ++i) {
         STX_CHECK(within(fmt::format("view {}", i), (views[i].*check)()));
@@ -119,12 +144,18 @@ Result<void> checkViews(const std::vector<ReferenceView>& views, ViewCheck check
 
 }  // namespace
 
+Result<void> checkViews(const std::vector<ReferenceView>& views) {
+    return checkEach(views, &ReferenceView::check);
+}
+
 Result<void> Bundle::check() const {
-    return checkViews(views, &ReferenceView::check);
+    STX_CHECK(checkViews(views));
+    return checkNames(viewNamesOf(views));
 }
 
 Result<void> Bundle::checkHeaders() const {
-    return checkViews(views, &ReferenceView::checkHeader);
+    STX_CHECK(checkEach(views, &ReferenceView::checkHeader));
+    return checkNames(viewNamesOf(views));
 }
 
 }  // namespace stx

@@ -33,56 +33,57 @@ glm::dvec3 originOf(const Model& model, bool planesKnown) {
 
 /// All but the cameras.
 template <class Model>
-void moveBounds(Model& model, const glm::dvec3& origin) {
-    model.origin += origin;
+void moveBounds(Model& model, const glm::dvec3& by) {
+    model.origin += by;
     if (!model.bounds || model.bounds->empty()) return;
-    model.bounds->min -= origin;
-    model.bounds->max -= origin;
+    model.bounds->min -= by;
+    model.bounds->max -= by;
 }
 
 template <class Model>
-void moveTo(Model& model, const glm::dvec3& origin) {
-    if (origin == glm::dvec3(0.0)) return;
-    for (ReferenceView& view : model.views) view.camera.position -= origin;
-    moveBounds(model, origin);
+void move(Model& model, const glm::dvec3& by) {
+    if (by == glm::dvec3(0.0)) return;
+    for (ReferenceView& view : model.views) view.camera.position -= by;
+    moveBounds(model, by);
 }
 
 class FromOrigin : public Sequence {
   public:
-    explicit FromOrigin(std::unique_ptr<Sequence> frames) : frames_(std::move(frames)) {
+    FromOrigin(std::unique_ptr<Sequence> frames, std::optional<glm::dvec3> origin)
+        : frames_(std::move(frames)), origin_(origin) {
         timeline_ = frames_->timeline();
     }
     Result<Bundle> frame(std::size_t index, Job& job) override {
         STX_TRY(auto bundle, frames_->frame(index, job));
-        moveTo(bundle, originBy(bundle, true));
+        move(bundle, offsetOf(bundle, true));
         return bundle;
     }
     Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
         STX_TRY(auto table, frames_->views(index, job));
-        const glm::dvec3 origin = originBy(std::as_const(*table).about(), table->planesKnown());
-        if (origin == glm::dvec3(0.0)) return table;
+        const glm::dvec3 by = offsetOf(std::as_const(*table).about(), table->planesKnown());
+        if (by == glm::dvec3(0.0)) return table;
         if (table->whole()) {
             STX_TRY(auto bundle, wholeBundle(std::move(table), job));
-            moveTo(bundle, origin);
+            move(bundle, by);
             return tableOf(std::move(bundle));
         }
-        ViewChange move;
-        move.header = [origin](ViewHeader& view) { view.camera.position -= origin; };
-        move.change = [origin](ReferenceView& view, Job&) -> Result<void> {
-            view.camera.position -= origin;
+        ViewChange change;
+        change.header = [by](ViewHeader& view) { view.camera.position -= by; };
+        change.change = [by](ReferenceView& view, Job&) -> Result<void> {
+            view.camera.position -= by;
             return {};
         };
-        move.takes = {"moving", 0};
-        auto moved = changedViews(std::move(table), std::move(move));
-        moveBounds(moved->about(), origin);
+        change.takes = {"moving", 0};
+        auto moved = changedViews(std::move(table), std::move(change));
+        moveBounds(moved->about(), by);
         return moved;
     }
 
   private:
-    /// Found once: all frames count from the same.
-    glm::dvec3 originBy(const Bundle& about, bool planesKnown) {
-        if (!origin_) origin_ = originOf(about, planesKnown);
-        return *origin_;
+    /// How far the origin of all frames, which is found once, is from that of this one.
+    glm::dvec3 offsetOf(const Bundle& about, bool planesKnown) {
+        if (!origin_) origin_ = about.origin + originOf(about, planesKnown);
+        return *origin_ - about.origin;
     }
 
     std::unique_ptr<Sequence> frames_;
@@ -92,11 +93,15 @@ class FromOrigin : public Sequence {
 }  // namespace
 
 std::unique_ptr<Sequence> fromOrigin(std::unique_ptr<Sequence> frames) {
-    return std::make_unique<FromOrigin>(std::move(frames));
+    return std::make_unique<FromOrigin>(std::move(frames), std::nullopt);
+}
+
+std::unique_ptr<Sequence> fromOrigin(std::unique_ptr<Sequence> frames, const glm::dvec3& origin) {
+    return std::make_unique<FromOrigin>(std::move(frames), origin);
 }
 
 void countFromOrigin(Atlas& atlas) {
-    moveTo(atlas, originOf(atlas, true));
+    move(atlas, originOf(atlas, true));
 }
 
 }  // namespace stx

@@ -14,6 +14,11 @@ namespace stx {
 /// alone while the planes are not known. Else nothing is changed.
 [[nodiscard]] std::unique_ptr<Sequence> fromOrigin(std::unique_ptr<Sequence> frames);
 
+/// The same frames, of bundles or files that may count from an origin each: all count from this
+/// one, as the frames of a sequence must.
+[[nodiscard]] std::unique_ptr<Sequence> fromOrigin(std::unique_ptr<Sequence> frames,
+                                                   const glm::dvec3& origin);
+
 /// The same of an atlas of one model (objectOf()).
 void countFromOrigin(Atlas& atlas);
 

@@ -258,6 +258,10 @@ double Timeline::durationOf(std::size_t frame) const {
            times[frame];
 }
 
+std::string Timeline::nameOf(std::size_t frame) const {
+    return fmt::format("frame {} ({:g} s)", frame, times[frame]);
+}
+
 bool Timeline::outside(double time) const {
     return time < times.front() - slack(time) || time >= std::max(end, times.back()) + slack(time);
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "lib/base/job.hpp"
@@ -45,6 +46,8 @@ struct Timeline {
     [[nodiscard]] std::size_t frameAt(double time) const;
     /// How long a frame is shown, in seconds.
     [[nodiscard]] double durationOf(std::size_t frame) const;
+    /// How messages name a frame, as "frame 2 (0.08 s)".
+    [[nodiscard]] std::string nameOf(std::size_t frame) const;
     /// Whether a time is before the first frame or when the last has ended.
     [[nodiscard]] bool outside(double time) const;
     /// Frames a second when all frames last equally long (to a tick); else 0.
@@ -66,7 +69,8 @@ void noteOutside(const std::vector<double>& times, const Timeline& timeline, Job
 /// A bundle in time, whose frames are made when they are asked for: a film of ten thousand frames
 /// takes the memory of one. All frames have the same views: in number, order and name; a view
 /// without a picture of a moment has its last one then, and before its first one nothing is known
-/// of what it sees (NoDepth::unknown). What stands still is the case of one frame.
+/// of what it sees (NoDepth::unknown). All count from one Bundle::origin: see fromOrigin(). What
+/// stands still is the case of one frame.
 class Sequence {
   public:
     virtual ~Sequence() = default;

@@ -108,6 +108,74 @@ class Calls(Case):
             self.assertEqual(len(list(frames)), 2)
             self.assertEqual([note for note in job.notes if "not used" in note], [sentence])
 
+    def test_a_number_of_numpy_is_one_time(self):
+        bundle = stx.convert(MODEL, views="ring:2", size=(32, 32), job=stx.Job())
+        film, camera = stx.Film([bundle, bundle], rate=4), bundle.views[0].camera
+        for time in (np.float32(0.25), np.int64(0), np.array(0.25), 0):
+            self.assertIsInstance(stx.render(film, camera, times=time), stx.Frame)
+        self.assertEqual(len(list(stx.render(film, camera, times=np.array([0.0, 0.25])))), 2)
+
+    def test_names_of_plain_video_may_come_one_by_one(self):
+        camera = stx.Camera((16, 12), 20)
+        bundle = stx.Bundle([plate(camera)])
+        for i in range(3):
+            stx.render(bundle, camera).save(f"p_{i}.png")
+        still = stx.background(f"p_{i}.png" for i in range(3))
+        self.assertEqual(still.colour.shape, (12, 16, 4))
+
+    def test_frames_of_a_film_count_from_one_origin(self):
+        bundles = []
+        for i in range(3):
+            with open("far.obj", "w") as file:
+                for a, b, c in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)):
+                    file.write(f"v {500000 + 10 * i + a} {b} {c}\n")
+                file.write("f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+            bundles.append(stx.convert("far.obj", views="ring:2", size=(16, 16), job=stx.Job()))
+        self.assertEqual(len({tuple(bundle.origin) for bundle in bundles}), 3)
+        film = stx.Film(bundles)
+        film.save("film.mp4")
+        film.save("f_%d.exr")
+        for frames in (film, stx.open_film("film.mp4"), stx.open_film("f_%d.exr")):
+            for frame, bundle in zip(frames, bundles):
+                self.assertEqual(tuple(frame.origin), tuple(bundles[0].origin))
+                np.testing.assert_allclose(frame.views[0].camera.position + frame.origin,
+                                           bundle.views[0].camera.position + bundle.origin, atol=1e-4)
+
+    def test_a_film_is_not_replaced_while_it_is_open(self):
+        bundle = stx.Bundle([plate(stx.Camera((16, 12), 20))])
+        stx.Film([bundle] * 3).save("q_%d.exr")
+        for i in (2, 1, 0):
+            os.rename(f"q_{i}.exr", f"q_{i + 1}.exr")
+        film = stx.open_film("q_%d.exr")
+        self.fails("usage", "'q_1.exr' is a file of a film that is open, which would be lost; give the output another name",
+                   film.save, "q_%d.exr")
+        self.assertEqual(sorted(os.listdir()), ["q_1.exr", "q_2.exr", "q_3.exr"])
+        self.assertEqual(len(list(film)), 3)
+
+    def test_what_is_saved_can_be_opened(self):
+        def bundle(camera):
+            return stx.Bundle([stx.View(np.zeros((12, 16, 3), "u1"), np.full((12, 16), 2.0, "f4"), camera)])
+        far = stx.Camera((16, 12), 20, world_from_camera=[[1, 0, 0, 4e38], [0, 1, 0, 0], [0, 0, 1, 0]])
+        for camera, text in ((far, "the camera's position (4e+38 0 0) does not fit 32-bit floats; write .exr"),
+                             (stx.Camera((16, 12), 1e-7), "the camera's fieldOfView would be 3.1415927 "),
+                             (stx.Camera((16, 12), 1e-40, orthographic=True), "fieldOfView would be inf inf in 32-bit floats")):
+            self.fails("unsupported", text, bundle(camera).save, "x.mp4")
+            self.assertFalse(os.path.exists("x.mp4"))
+            bundle(camera).save("x.exr")
+            stx.open("x.exr")
+
+    def test_names_of_views_are_unique(self):
+        cameras = [view.camera for view in stx.convert(MODEL, views="ring:2", size=(16, 16), job=stx.Job()).views]
+        self.fails("usage", "two views have the name 'a'; names are unique in a bundle", stx.convert, MODEL, cameras=cameras,
+                   names=["a", "a"])
+
+    def test_a_frame_keeps_its_time_and_duration(self):
+        film = stx.Film([stx.Bundle([plate(stx.Camera((16, 12), 20))])] * 3, rate=10)
+        for i in (0, 1):
+            film[i].save("f.mp4")
+            frame = stx.open("f.mp4")
+            self.assertEqual((frame.time, frame.duration), (film[i].time, film[i].duration))
+
     def test_times_outside_a_film_are_noted(self):
         bundle = stx.convert(MODEL, views="ring:2", size=(32, 32), job=stx.Job())
         film, camera, job = stx.Film([bundle, bundle]), bundle.views[0].camera, stx.Job()

@@ -83,7 +83,7 @@ class WrongInput(Case):
         self.fails("usage", "no_depth is 'none'; empty or unknown", stx.View, colour, depth, self.camera, no_depth="none")
         self.fails("usage", "depthBits is 12", stx.View, colour, depth, self.camera, depth_bits=12)
         one = stx.View(colour, depth, self.camera, name="a")
-        self.fails("usage", "two views have the name 'a'", stx.Bundle, [one, one])
+        self.fails("invalidInput", "two views have the name 'a'", stx.Bundle, [one, one])
         self.fails("invalidInput", "view", stx.Bundle, [])
 
     def test_masked_arrays(self):
@@ -120,7 +120,9 @@ class WrongInput(Case):
         self.fails("usage", "", look, (1, 1, 1), (1, 1, 1))
         self.fails("usage", "eye is [1, nan, 1]; three finite numbers", look, [1, np.nan, 1], (0, 0, 0))
         self.fails("usage", "target is (0, 0)", look, (1, 1, 1), (0, 0))
-        self.fails("usage", "fovRad", look, (1, 1, 1), (0, 0, 0), fov=180)
+        self.fails("usage", "the field of view is 180 degrees; it must be above 0 and below 180", look, (1, 1, 1), (0, 0, 0), fov=180)
+        self.fails("usage", "the window of an orthographic camera is -1 high; above 0", look, (1, 1, 1), (0, 0, 0),
+                   ortho=-1)
         self.fails("usage", "up is", look, (1, 1, 1), (0, 0, 0), up=(0, 0, 0))
         with self.assertRaisesRegex(TypeError, "no keyword 'fow'; it has up, size, fov and ortho"):
             look((1, 1, 1), (0, 0, 0), fow=3)

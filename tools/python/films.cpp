@@ -57,7 +57,8 @@ FilmPointer makeFilm(const std::vector<BundleModel>& bundles, double rate) {
     }
     auto timeline = steadyTimeline(static_cast<int>(frames.size()), rate);
     return std::make_shared<Film>(
-        std::make_unique<KeptBundles>(std::move(frames), std::move(timeline)));
+        fromOrigin(std::make_unique<KeptBundles>(std::move(frames), std::move(timeline)),
+                   bundles[0].get().origin));
 }
 
 FilmPointer openFilm(const std::filesystem::path& path, const py::dict& keywords, JobHandle* job) {
@@ -206,8 +207,9 @@ void bindFilms(py::module_& module) {
     py::class_<Film, FilmPointer>(module, "Film",
                                   R"(Bundles in time, each read when it is asked for.
 
-bundles: a list of stx.Bundle with the same views. rate: frames a second, above 0. len(film), film[i] and
-iteration give its frames as stx.Bundle. One call at a time works; others wait.)")
+bundles: a list of stx.Bundle with the same views; frames count from the origin of the first. rate:
+frames a second, above 0. len(film), film[i] and iteration give its frames as stx.Bundle. One call at a
+time works; others wait.)")
         .def(py::init(&makeFilm), py::arg("bundles"), py::kw_only(), py::arg("rate") = 25.0)
         .def_property_readonly(
             "times", [](const FilmPointer& f) { return arrayOf(f->timeline().times, f); },
@@ -232,11 +234,11 @@ iteration give its frames as stx.Bundle. One call at a time works; others wait.)
         .def("save", &saveFilm, py::arg("path"), py::kw_only(), py::arg("jpeg_quality") = 0,
              py::arg("h264") = py::none(), py::arg("no_clobber") = false,
              py::arg("job") = py::none(),
-             R"(Writes it frame by frame: .mp4, .xmt, .bt, or name_%04d.exr.
+             R"(Writes it whole or not at all: .mp4, .xmt, .bt, or name_%04d.exr.
 
-jpeg_quality: of colours, 1..100; 0: PNG, exact. h264: pictures that change as video of this quality, 0
-(the best) to 51; None: as PNG or JPEG. no_clobber: a target that exists is an error. Raises stx.Error
-(usage, invalidInput, io).)")
+The files of a film that is open cannot be replaced. jpeg_quality: of colours, 1..100; 0: PNG, exact.
+h264: pictures that change as video of this quality, 0 (the best) to 51; None: as PNG or JPEG.
+no_clobber: a target that exists is an error. Raises stx.Error (usage, invalidInput, io).)")
         .def("__len__", [](const FilmPointer& f) { return f->timeline().count(); })
         .def("__getitem__",
              [](const FilmPointer& f, py::ssize_t index) { return frameOf(f, index, nullptr); })

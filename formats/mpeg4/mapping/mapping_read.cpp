@@ -107,6 +107,9 @@ class BundleReader {
         object.about.bounds = object.notes.bounds;
         object.about.origin = object.notes.origin;
         object.about.time = object.notes.start;
+        object.about.duration = object.notes.duration;
+        // A moment at 0, which needs no note.
+        if (object.about.duration && !object.about.time) object.about.time = 0;
         return object;
     }
 
@@ -160,6 +163,7 @@ class BundleReader {
             takeViews(all, notes, info.parent, plans, lost);
             if (all.origin == glm::dvec3(0.0)) all.origin = notes.origin;
             if (!all.start) all.start = notes.start;
+            if (!all.duration) all.duration = notes.duration;
             if (!notes.bounds) continue;
             places.push_back(info.worldFromLocal);
             if (!all.bounds) all.bounds.emplace();

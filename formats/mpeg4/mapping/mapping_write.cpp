@@ -32,6 +32,7 @@ class SceneWriter {
         // A presentation begins at 0: players would wait for 40 years where a film begins at Unix
         // time, edit lists cannot begin before 0, and texts have none.
         if (bundle_.time.value_or(0) != 0) notes.start = bundle_.time;
+        notes.duration = bundle_.duration;
         NodePtr root;
         if (options_.octreeLevels > 0) {
             bounds_ = bundle_.bounds ? *bundle_.bounds : bundle_.computeBounds();
@@ -212,7 +213,7 @@ class SceneWriter {
             STX_SET(bytes, colourPng(colour, false));
         NodePtr node = makeNode("DepthImage");
         node->defName = defNameOf(bundle_.views[i], i, key, notes);
-        setCamera(*node, padding.camera);
+        STX_CHECK(within(viewName(i), setCamera(*node, padding.camera)));
         node->set("orthographic", true);
         NodePtr texture = makeNode("SimpleTexture");
         STX_TRY(NodePtr image, textureNode(node->defName, "texture", std::move(bytes)));
@@ -300,7 +301,7 @@ class SceneWriter {
         const bool v2 = isV2(view);
         NodePtr node = makeNode(v2 ? "DepthImageV2" : "DepthImage");
         node->defName = defNameOf(view, i, key, notes);
-        setCamera(*node, images.padding.camera);
+        STX_CHECK(within(viewName(i), setCamera(*node, images.padding.camera)));
         node->set("nearPlane", images.nearPlane);
         node->set("farPlane", images.farPlane);
         node->set("orthographic", images.padding.camera.orthographic);

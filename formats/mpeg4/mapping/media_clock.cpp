@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "lib/model/sequence.hpp"
-
 namespace stx::mpeg4 {
 namespace {
 
@@ -36,6 +34,18 @@ std::uint64_t ticksAt(double seconds, std::uint32_t timescale) {
     if (!(ticks > 0)) return 0;
     constexpr auto kLast = std::numeric_limits<std::uint64_t>::max();
     return ticks < static_cast<double>(kLast) ? static_cast<std::uint64_t>(ticks) : kLast;
+}
+
+Result<void> checkTicks(const Timeline& film, std::uint32_t timescale) {
+    const auto& times = film.times;
+    const auto ticks = [&](double time) { return ticksAt(time - film.start(), timescale); };
+    for (std::size_t i = 1; i < times.size(); ++i)
+        if (ticks(times[i]) <= ticks(times[i - 1]))
+            return fail(ErrorCode::unsupported,
+                        "frames {} and {} are at {:.12g} and {:.12g} s, and the clock of an MPEG-4 "
+                        "film has {} ticks a second, so that one would be lost; write .exr",
+                        i - 1, i, times[i - 1], times[i], timescale);
+    return {};
 }
 
 std::uint64_t ticksBegun(double seconds, std::uint32_t timescale, double slack) {

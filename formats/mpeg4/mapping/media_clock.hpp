@@ -7,6 +7,7 @@
 
 #include "formats/mpeg4/scene/document.hpp"
 #include "formats/mpeg4/scene/interpolators.hpp"
+#include "lib/model/sequence.hpp"
 
 namespace stx::mpeg4 {
 
@@ -22,6 +23,9 @@ inline constexpr double kLatestMoment = 1e12;
 
 /// The last tick that has begun at a time, or begins no later than `slack` seconds after it.
 [[nodiscard]] std::uint64_t ticksBegun(double seconds, std::uint32_t timescale, double slack);
+
+/// Errors (unsupported): frames of a film that would be shown at one tick of its clock.
+[[nodiscard]] Result<void> checkTicks(const Timeline& film, std::uint32_t timescale);
 
 /// When the samples of a stream are shown, counted from the stream's start: decoding time plus
 /// composition offset, through the edit list (ISO/IEC 14496-12, 8.6).

@@ -45,10 +45,16 @@ struct ViewTrack {
     bool coverageLost = false;         ///< by colour that is H.264
 };
 
-/// Errors: those of checkSameViews(), and (unsupported) a view whose size changes: a stream has
-/// one.
+/// Errors: those of checkSameViews(), (invalidInput) another origin: a scene has one, and
+/// (unsupported) a view whose size changes: a stream has one.
 Result<void> checkFrame(const Bundle& first, const Bundle& frame) {
     STX_CHECK(checkSameViews(first, frame));
+    const auto &from = frame.origin, &start = first.origin;
+    if (from != start)
+        return fail(ErrorCode::invalidInput,
+                    "its coordinates count from ({} {} {}), but those at the start from ({} {} "
+                    "{}); fromOrigin() counts all frames from one origin",
+                    from.x, from.y, from.z, start.x, start.y, start.z);
     for (std::size_t i = 0; i < first.views.size(); ++i) {
         const Camera &was = first.views[i].camera, &is = frame.views[i].camera;
         if (is.width != was.width || is.height != was.height)
@@ -74,6 +80,8 @@ class SequenceWriter {
         // Before the frames are read twice.
         if (asVideo()) STX_CHECK(VideoProcess::start(job_.limits));
         STX_CHECK(frames_.timeline().check());
+        scale_ = frames_.timeline().timescale();
+        STX_CHECK(checkTicks(frames_.timeline(), scale_));
         STX_CHECK(findRanges());
         STX_CHECK(begin());
         const std::size_t count = frames_.timeline().count();
@@ -85,16 +93,13 @@ class SequenceWriter {
             quiet.workFor(job_);
             STX_TRY(const auto table, frame(i, quiet));
             if (auto done = add(*table, i, quiet); !done)
-                return tl::unexpected(done.error().at(placeOf(i)));
+                return tl::unexpected(done.error().at(frames_.timeline().nameOf(i)));
         }
         STX_CHECK(finish());
         return std::move(document_);
     }
 
   private:
-    [[nodiscard]] std::string placeOf(std::size_t i) const {
-        return fmt::format("frame {} ({:g} s)", i, frames_.timeline().times[i]);
-    }
     /// The presentation's time; see ViewNotes::start for the film's.
     [[nodiscard]] std::uint64_t ticks(double seconds) const {
         return ticksAt(seconds - frames_.timeline().start(), scale_);
@@ -103,7 +108,7 @@ class SequenceWriter {
     /// A frame, with the ranges of the sequence when these are known.
     Result<std::unique_ptr<ViewTable>> frame(std::size_t i, Job& job) {
         auto table = frames_.views(i, job);
-        if (!table) return tl::unexpected(table.error().at(placeOf(i)));
+        if (!table) return tl::unexpected(table.error().at(frames_.timeline().nameOf(i)));
         if (ranges_.empty()) return table;
         std::vector<ViewHeader> headers;
         loss_.ownSteps.clear();
@@ -141,7 +146,7 @@ class SequenceWriter {
             }
             auto looked = checkFrame(first_, std::as_const(*table).about());
             if (looked) looked = lookAt(*table, ranges, i == 0, quiet);
-            if (!looked) return tl::unexpected(looked.error().at(placeOf(i)));
+            if (!looked) return tl::unexpected(looked.error().at(frames_.timeline().nameOf(i)));
         }
         for (std::size_t k = 0; k < ranges.size(); ++k)
             if (ranges[k].everUnknown && ranges[k].everEmpty)
@@ -230,6 +235,7 @@ class SequenceWriter {
         quiet.workFor(job_);
         STX_TRY(auto table, frame(0, quiet));
         table->about().bounds = bounds_;
+        table->about().duration.reset();  // the streams tell it
         SceneWriteOptions options = options_;
         for (const ViewRange& range : ranges_)
             options.splatRanges.push_back(range.splats ? range.longestSplat : 0);
@@ -244,7 +250,6 @@ class SequenceWriter {
             before[k] = ViewBefore::of(view);
         });
         STX_TRY(document_, sceneFromViews(*table, options, &spool_, job_));
-        scale_ = frames_.timeline().timescale();
         document_.sceneStream.timescale = scale_;
         const Timeline& timeline = frames_.timeline();
         const double span = timeline.times.back() - timeline.times.front();
@@ -506,7 +511,7 @@ class SequenceWriter {
                         was.cx, was.cy, camera.cx, camera.cy);
         track.camera = camera;
         NodePtr node = std::make_shared<Node>(*track.node);
-        setCamera(*node, images.padding.camera);
+        STX_CHECK(setCamera(*node, images.padding.camera));
         // Only values of the camera were set; nodes below are shared.
         const auto same = [](const Node::SetField& a, const Node::SetField& b) {
             return a.index == b.index && sameValue(a.value, b.value);

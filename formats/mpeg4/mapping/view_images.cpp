@@ -25,11 +25,33 @@ float floatAbove(double v) {
 
 }  // namespace
 
-void setCamera(Node& node, const Camera& camera) {
+bool isFieldOfView(glm::vec2 fov, bool orthographic) {
+    constexpr float kPi = 3.14159265f;
+    return fov.x > 0 && fov.y > 0 && std::isfinite(fov.x) && std::isfinite(fov.y) &&
+           (orthographic || (fov.x < kPi && fov.y < kPi));
+}
+
+std::string_view fieldOfViewRule(bool orthographic) {
+    return orthographic ? "the window of an orthographic DepthImage has sides above 0"
+                        : "angles lie between 0 and 3.1415927 (both excluded)";
+}
+
+Result<void> setCamera(Node& node, const Camera& camera) {
     const glm::dvec4 turn = axisAngleFromQuat(camera.orientation);
-    node.set("position", glm::vec3(camera.position));
+    const glm::vec3 position(camera.position);
+    if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z))
+        return fail(ErrorCode::unsupported,
+                    "the camera's position ({:g} {:g} {:g}) does not fit 32-bit floats; write .exr",
+                    camera.position.x, camera.position.y, camera.position.z);
+    const glm::vec2 fov(camera.fieldOfView());
+    if (!isFieldOfView(fov, camera.orthographic))
+        return fail(ErrorCode::unsupported,
+                    "the camera's fieldOfView would be {} {} in 32-bit floats; {}; write .exr",
+                    fov.x, fov.y, fieldOfViewRule(camera.orthographic));
+    node.set("position", position);
     node.set("orientation", Rotation{glm::vec3(turn), static_cast<float>(turn.w)});
-    node.set("fieldOfView", glm::vec2(camera.fieldOfView()));
+    node.set("fieldOfView", fov);
+    return {};
 }
 
 bool isWrittenAsV2(const ReferenceView& view, const SceneWriteOptions& options) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/scene/placement.hpp"
@@ -58,8 +59,14 @@ struct PictureLoss {
                                             const SceneWriteOptions& options, const Limits& limits,
                                             float longestSplat = 0);
 
-/// Position, orientation and fieldOfView of a DepthImage.
-void setCamera(Node& node, const Camera& camera);
+/// Whether a DepthImage may have it: angles, or the sides of a window.
+[[nodiscard]] bool isFieldOfView(glm::vec2 fov, bool orthographic);
+/// What is expected of it, for messages.
+[[nodiscard]] std::string_view fieldOfViewRule(bool orthographic);
+
+/// Position, orientation and fieldOfView of a DepthImage. Errors (unsupported): they do not fit
+/// floats.
+[[nodiscard]] Result<void> setCamera(Node& node, const Camera& camera);
 
 /// Whether the view becomes a DepthImageV2.
 [[nodiscard]] bool isWrittenAsV2(const ReferenceView& view, const SceneWriteOptions& options);

@@ -50,6 +50,8 @@ ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
             if (const auto n = numbers(line, 3); !n.empty()) notes.origin = {n[0], n[1], n[2]};
         } else if (line.starts_with("start ")) {
             if (const auto n = numbers(line, 1); !n.empty()) notes.start = n[0];
+        } else if (line.starts_with("duration ")) {
+            if (const auto n = numbers(line, 1); !n.empty() && n[0] > 0) notes.duration = n[0];
         } else if (line.starts_with("name ")) {
             const auto w = words(line, 3);
             if (w.size() == 3) notes.views[std::string(w[1])].name = w[2];
@@ -100,6 +102,7 @@ std::vector<std::string> ViewNotes::text() const {
     if (origin != glm::dvec3(0.0))
         info.push_back(fmt::format("origin {} {} {}", origin.x, origin.y, origin.z));
     if (start) info.push_back(fmt::format("start {}", *start));
+    if (duration) info.push_back(fmt::format("duration {}", *duration));
     if (count && !views.empty()) info.push_back(fmt::format("views {}", *count));
     for (const auto& [key, view] : views) {
         if (!view.name.empty()) info.push_back(fmt::format("name {} {}", key, view.name));

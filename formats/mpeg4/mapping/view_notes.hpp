@@ -18,6 +18,7 @@
 ///
 ///     "bounds minX minY minZ maxX maxY maxZ"
 ///     "start seconds" (of the film's own clock, at the presentation's 0; see Timeline)
+///     "duration seconds" (of a moment of a film that stands alone; see Bundle::duration)
 ///     "origin x y z" (added to all coordinates here, gives the world's; see Bundle::origin)
 ///     "views count" (DepthImages, or pictures of an OctreeImage, beside the WorldInfo)
 ///     "name #N the view's own name"
@@ -39,7 +40,7 @@ namespace stx::mpeg4 {
 struct ViewNotes {
     std::optional<Bounds> bounds;
     glm::dvec3 origin{0.0};
-    std::optional<double> start;
+    std::optional<double> start, duration;
     std::optional<int> count;  ///< of the views that keys number
     struct Pad {
         int left = 0, top = 0, right = 0, bottom = 0;

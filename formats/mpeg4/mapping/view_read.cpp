@@ -38,12 +38,9 @@ Result<ReferenceView> ViewReader::cameraOf(const ViewPlan& plan, int width, int 
     view.name = plan.name;
     const auto fov = node.get<glm::vec2>("fieldOfView");
     const bool orthographic = node.get<bool>("orthographic");
-    constexpr float kPi = 3.14159265f;
-    if (!(fov.x > 0 && fov.y > 0 && std::isfinite(fov.x) && std::isfinite(fov.y)) ||
-        (!orthographic && (fov.x >= kPi || fov.y >= kPi)))
+    if (!isFieldOfView(fov, orthographic))
         return fail(ErrorCode::invalidInput, "fieldOfView is {} {}; {}", fov.x, fov.y,
-                    orthographic ? "the window of an orthographic DepthImage has sides above 0"
-                                 : "angles lie between 0 and 3.1415927 (both excluded)");
+                    fieldOfViewRule(orthographic));
     view.nearPlane = node.get<float>("nearPlane");
     view.farPlane = node.get<float>("farPlane");
     if (!(view.nearPlane >= 0 && view.nearPlane < view.farPlane && std::isfinite(view.farPlane)))

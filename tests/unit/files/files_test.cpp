@@ -11,6 +11,7 @@
 #include <fstream>
 #include <set>
 
+#include "formats/files/named_files.hpp"
 #include "formats/files/temporaries.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -124,6 +125,53 @@ TEST(OutputFile, WritesThroughLinksAndKeepsTheMode) {
     EXPECT_TRUE(fs::is_symlink(folder / "link"));
     EXPECT_EQ(get(folder / "real"), "new");
     EXPECT_EQ(fs::status(folder / "real").permissions(), fs::perms(0640));
+}
+
+TEST(OutputFiles, AppearTogetherOrNotAtAll) {
+    const TemporaryFolder folder;
+    const auto count = [&] {
+        const auto all = std::filesystem::directory_iterator(folder.path());
+        return std::distance(begin(all), end(all));
+    };
+    ASSERT_TRUE(writeFile(folder / "b", Bytes(1)));
+    for (const bool commits : {false, true}) {
+        OutputFiles files;
+        for (const char* name : {"a", "b", "c"})
+            ASSERT_TRUE(writeFile(folder / name, Bytes(2), {.together = &files}));
+        EXPECT_FALSE(std::filesystem::exists(folder / "a"));
+        EXPECT_EQ(std::filesystem::file_size(folder / "b"), 1U);
+        if (commits) {
+            ASSERT_TRUE(files.commit());
+            EXPECT_EQ(std::filesystem::file_size(folder / "a"), 2U);
+            EXPECT_EQ(std::filesystem::file_size(folder / "b"), 2U);
+        }
+    }
+    EXPECT_EQ(count(), 3);
+}
+
+TEST(OutputFiles, OfThousandsKeepNoneOpen) {
+    const TemporaryFolder folder;
+    OutputFiles files;
+    for (int i = 0; i < 3000; ++i)
+        ASSERT_TRUE(writeFile(folder / std::to_string(i), Bytes(1), {.together = &files})) << i;
+    ASSERT_TRUE(files.commit());
+    EXPECT_TRUE(std::filesystem::exists(folder / "2999"));
+}
+
+TEST(OutputFiles, KeepWhatIsOfAFilmThatIsOpen) {
+    const TemporaryFolder folder;
+    ASSERT_TRUE(writeFile(folder / "a", Bytes(1)));
+    {
+        const FilesOfFilm film({folder / "a"});
+        const FilesOfFilm again({folder / "a"});
+        const auto refused = writeFile(folder / "a", Bytes(2));
+        ASSERT_FALSE(refused);
+        EXPECT_EQ(refused.error().text(),
+                  fmt::format("'{}' is a file of a film that is open, which would be lost; give "
+                              "the output another name",
+                              (folder / "a").string()));
+    }
+    EXPECT_TRUE(writeFile(folder / "a", Bytes(2)));
 }
 
 TEST(OutputFile, ErrorsNameTheTarget) {

@@ -1,6 +1,8 @@
 // Coordinates that floats would round are counted from an origin nearby.
 #include "lib/model/from_origin.hpp"
 
+#include "formats/any/sequences.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tests/unit/sequences/moving_views.hpp"
 
 namespace stx {
@@ -66,6 +68,62 @@ TEST(FromOrigin, CamerasAndBoundsCountFromTheSameInAllFrames) {
             }
         }
     }
+}
+
+/// A film each frame of which counts from a place of its own, and is in the world where the moving
+/// views are.
+std::unique_ptr<Sequence> ownOrigins() {
+    return changed(std::make_unique<MovingViews>(3), [](Bundle& bundle, Job&) {
+        bundle.bounds = bundle.computeBounds();
+        bundle.origin = glm::dvec3(1000 * *bundle.time, 5, 0);
+        for (ReferenceView& view : bundle.views) view.camera.position -= bundle.origin;
+        bundle.bounds->min -= bundle.origin;
+        bundle.bounds->max -= bundle.origin;
+        return Result<void>();
+    });
+}
+
+TEST(FromOrigin, FramesWithOriginsOfTheirOwnCountFromOne) {
+    TemporaryFolder folder("origins");
+    Job job;
+    const glm::dvec3 start(0, 5, 0);
+    const auto moved = fromOrigin(ownOrigins(), start);
+    const auto film = folder / "f_%d.exr";
+    ASSERT_TRUE(saveSequence(*ownOrigins(), film, {}, job));
+    const auto read = openSequence(film, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    ASSERT_TRUE(saveSequence(**read, folder / "film.mp4", {}, job));
+    const auto scene = openSequence(folder / "film.mp4", {}, job);
+    ASSERT_TRUE(scene) << scene.error().text();
+    MovingViews truth(3);
+    for (Sequence* frames : {moved.get(), read->get(), scene->get()}) {
+        for (const std::size_t i : {2, 0, 1}) {
+            const Bundle was = *truth.frame(i, job), is = *frames->frame(i, job);
+            const auto table = *frames->views(i, job);
+            EXPECT_EQ(is.origin, start);
+            EXPECT_EQ(std::as_const(*table).about().origin, start);
+            for (std::size_t k = 0; k < was.views.size(); ++k) {
+                const auto position = was.views[k].camera.position - start;
+                EXPECT_LT(glm::distance(is.views[k].camera.position, position), 1e-5) << i;
+                EXPECT_LT(glm::distance((*table->view(k, job))->camera.position, position), 1e-5);
+            }
+            ASSERT_TRUE(is.bounds);
+            EXPECT_LE(is.bounds->min.x + is.origin.x, was.computeBounds().min.x + 1e-5);
+            EXPECT_LT(glm::distance(is.bounds->min, std::as_const(*table).about().bounds->min),
+                      1e-9);
+        }
+    }
+}
+
+TEST(FromOrigin, MpegFourTakesOneOrigin) {
+    TemporaryFolder folder("origins_refused");
+    Job job;
+    const auto saved = saveSequence(*ownOrigins(), folder / "film.mp4", {}, job);
+    ASSERT_FALSE(saved);
+    EXPECT_EQ(saved.error().text(),
+              "frame 1 (0.04 s): its coordinates count from (40 5 0), but those at the start from "
+              "(0 5 0); fromOrigin() counts all frames from one origin");
+    EXPECT_FALSE(std::filesystem::exists(folder / "film.mp4"));
 }
 
 TEST(FromOrigin, WhatFloatsHoldWellStaysAsItIs) {

@@ -106,6 +106,7 @@ const std::vector<Sample>& samples() {
     static const std::vector<Sample> all = {
         {{3002}, "\"nearPlane\":", "\"nearPlane\":-"},
         {{3003}, "\"fx\":", "\"fx\":-"},
+        {{3009}, "\"name\":\"view 1\"", "\"name\":\"view 0\""},
         {{3005}, "\"quaternion\":[-0.", "\"quaternion\":[-5."},
         {{5001}, "\"atlasX\":", "\"atlasX\":99999"},
         {{5001}, "\"viewX\":", "\"viewX\":-7"},

@@ -15,6 +15,7 @@ and stop within a second when Ctrl-C is pressed.
 """
 from __future__ import annotations
 
+import numbers
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Union, overload
@@ -37,6 +38,11 @@ Path = Union[str, "os.PathLike[str]"]
 
 def _is_path(value: object) -> bool:
     return isinstance(value, (str, os.PathLike))
+
+
+def _is_number(value: object) -> bool:
+    """Whether it is one number, as Python or numpy has it."""
+    return isinstance(value, numbers.Real) or getattr(value, "ndim", None) == 0
 
 
 def _given(function: Any, options: dict[str, Any]) -> list[str]:
@@ -173,6 +179,8 @@ def background(source: Film | Path | Sequence[Path] | NDArray[np.uint8], *, supp
     if isinstance(source, Film):
         return _stx.background_of_film(source, moving, job)
     inputs: Any = [source] if _is_path(source) else source
+    if isinstance(inputs, Iterator):
+        inputs = list(inputs)
     if not hasattr(inputs, "dtype") and not (isinstance(inputs, Iterable) and all(map(_is_path, inputs))):
         raise TypeError(f"this is {type(source).__name__}; a stx.Film, an array of frames or names of files are expected")
     return _stx.still_background(inputs, plain, job)
@@ -232,7 +240,7 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
         moments = _moments(model, times, len(path), job)
         _note_unused(Bundle, given, mode, job)
         pictures = _draw_film(model, path * (len(moments) // max(1, len(path))), moments, drawing, job)
-        single = single and isinstance(times, (int, float))
+        single = single and _is_number(times)
     elif times is not None:
         raise TypeError("times are of a stx.Film; open it by stx.open_film()")
     else:
@@ -259,8 +267,8 @@ def _note_unused(kind: type, given: list[str], mode: str, job: Job | None) -> No
 
 def _moments(film: Film, times: float | Iterable[float] | None, cameras: int, job: Job | None) -> list[float]:
     """A time for each picture."""
-    wanted = film.times if times is None else times
-    moments = [float(wanted)] if isinstance(wanted, (int, float)) else [float(time) for time in wanted]
+    wanted: Any = film.times if times is None else times
+    moments = [float(wanted)] if _is_number(wanted) else [float(time) for time in wanted]
     _stx.check_times(film, moments, job)
     if len(moments) == 1:
         moments *= cameras
@@ -293,7 +301,7 @@ def compare(a: Path | Frame | ArrayLike, b: Path | Frame | ArrayLike, *, mask: A
 
     a, b: a file, a Frame (as its PNG), or (height, width, 3 or 4) uint8 (sRGB) or float32 (linear light), straight
     alpha. As floats when both are, by codes of 16 bits when one is a file of these, else as 8-bit sRGB. mask: (height,
-    width) bool or uint8: only these pixels count. background: grey or (r, g, b), sRGB-coded, 0..1, laid behind both. Raises
-    Error: usage, io, invalidInput, unsupported.
+    width) bool or uint8: only pixels of True, or of 128 and more, count. background: grey or (r, g, b), sRGB-coded, 0..1,
+    laid behind both. Raises Error: usage, io, invalidInput, unsupported.
     """
     return _stx.compare(a, b, mask, background, job)
