@@ -61,7 +61,7 @@ constexpr Rule kRules[] = {
     {3007, warning, kDibr, "nearPlane of a perspective camera is above 0"},
     {3008, warning, kDibr,
      "orthographic or fieldOfView is given: by default the angle is taken for a window"},
-    {3009, error, kFile, "the views of a model have names that differ"},
+    {3009, warning, kFile, "the views of a model have names that differ"},
 
     {4001, error, kDibr, "depth and texture have the same size"},
     {4002, error, kDibr, "the depth image is grey"},

@@ -184,7 +184,6 @@ Result<void> Atlas::check() const {
     }
     for (const AtlasObject& o : objects)
         STX_CHECK(within(fmt::format("object '{}'", o.name), checkPixels(o)));
-    STX_CHECK(checkNames(*this));
     for (std::size_t i = 0; i < pages.size(); ++i) {
         const auto& p = pages[i];
         const auto same = [&](const auto& image) {

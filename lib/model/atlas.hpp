@@ -104,8 +104,7 @@ struct Atlas {
     /// view has pixels there. The atlas must pass check().
     [[nodiscard]] bool paddingHolds(int texels) const;
     /// Errors (invalidInput) when a rectangle leaves its view or page, two overlap, sizes disagree,
-    /// objects do not have all views, two views of a model have one name, or a number, a depth or
-    /// the layout is one that cannot be.
+    /// objects do not have all views, or a number, a depth or the layout is one that cannot be.
     [[nodiscard]] Result<void> check() const;
 };
 

@@ -129,7 +129,7 @@ namespace {
 
 using ViewCheck = Result<void> (ReferenceView::*)() const;
 
-Result<void> checkEach(const std::vector<ReferenceView>& views, ViewCheck check) {
+Result<void> checkViews(const std::vector<ReferenceView>& views, ViewCheck check) {
     if (views.empty()) return fail(ErrorCode::invalidInput, "the bundle has no reference view");
     for (std::size_t i = 0; i < views.size(); ++i) {
         STX_CHECK(within(fmt::format("view {}", i), (views[i].*check)()));
@@ -144,18 +144,12 @@ Result<void> checkEach(const std::vector<ReferenceView>& views, ViewCheck check)
 
 }  // namespace
 
-Result<void> checkViews(const std::vector<ReferenceView>& views) {
-    return checkEach(views, &ReferenceView::check);
-}
-
 Result<void> Bundle::check() const {
-    STX_CHECK(checkViews(views));
-    return checkNames(viewNamesOf(views));
+    return checkViews(views, &ReferenceView::check);
 }
 
 Result<void> Bundle::checkHeaders() const {
-    STX_CHECK(checkEach(views, &ReferenceView::checkHeader));
-    return checkNames(viewNamesOf(views));
+    return checkViews(views, &ReferenceView::checkHeader);
 }
 
 }  // namespace stx

@@ -36,8 +36,7 @@ struct Bundle {
     void noteMaterialLeftOut(Job& job) const;
     /// The bounds of all points, computed from the pixels.
     [[nodiscard]] Bounds computeBounds() const;
-    /// Each view's check(), with its index; at least one view; one colour space in all views; names
-    /// that differ (checkNames()).
+    /// Each view's check(), with its index; at least one view; one colour space in all views.
     ///
     /// Who calls it: it looks at every pixel, so a pixel is checked once, by whoever brings it in.
     /// A reader returns only bundles that pass; openBundle() and saveBundle() rely on that. A

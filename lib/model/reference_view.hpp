@@ -78,7 +78,7 @@ struct ColourFile {
 
 /// What is said of a view beside its images.
 struct ViewHeader {
-    std::string name;  ///< unique in its bundle; becomes part and file names
+    std::string name;  ///< becomes part and file names, which number what comes twice
     Camera camera;
 
     double nearPlane = 10.0;  ///< scene units from the viewpoint; bounds the object

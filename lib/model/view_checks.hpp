@@ -14,9 +14,6 @@ struct Atlas;
 /// Errors (invalidInput): a camera that fails check(), planes or depth bits that cannot be.
 [[nodiscard]] Result<void> checkNumbers(const ViewHeader& view);
 
-/// Bundle::check() of views of several models, whose names may be the same.
-[[nodiscard]] Result<void> checkViews(const std::vector<ReferenceView>& views);
-
 /// Pixels that are points. Errors (invalidInput): a depth that is NaN or below 0.
 [[nodiscard]] Result<std::int64_t> countPoints(const Image<float>& depth);
 

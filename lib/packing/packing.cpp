@@ -4,7 +4,6 @@
 #include <numeric>
 
 #include "lib/base/parallel.hpp"
-#include "lib/model/view_checks.hpp"
 #include "lib/packing/layout.hpp"
 #include "lib/packing/views_one_by_one.hpp"
 
@@ -227,7 +226,7 @@ Result<void> checkSettings(const ViewTable& table, const PackSettings& settings)
         (size.x < 1 || size.y < 1 || std::max(size.x, size.y) > settings.maxSize))
         return fail(ErrorCode::usage, "textures of {}x{} are asked for; 1 to {} is possible",
                     size.x, size.y, settings.maxSize);
-    if (table.whole()) STX_CHECK(checkViews(table.about().views));
+    if (table.whole()) STX_CHECK(table.about().check());
     if (settings.objects) STX_CHECK(checkObjects(*settings.objects, table.count()));
     if (!settings.contentOf) return {};
     const std::vector<ReferenceView>& content = settings.contentOf->views;

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "lib/base/parallel.hpp"
-#include "lib/model/view_checks.hpp"
 #include "lib/model/views_over.hpp"
 #include "lib/packing/layout.hpp"
 #include "lib/packing/packing.hpp"
@@ -430,7 +429,7 @@ Result<void> checkPruning(const ViewTable& table, const Limits& limits) {
 
 Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& settings, Job& job) {
     STX_CHECK(checkSettings(settings));
-    if (table.whole()) STX_CHECK(checkViews(table.about().views));
+    if (table.whole()) STX_CHECK(table.about().check());
     STX_CHECK(checkPruning(table, job.limits));
     Pruning out;
     PruneReport& report = out.report;

@@ -83,7 +83,7 @@ class WrongInput(Case):
         self.fails("usage", "no_depth is 'none'; empty or unknown", stx.View, colour, depth, self.camera, no_depth="none")
         self.fails("usage", "depthBits is 12", stx.View, colour, depth, self.camera, depth_bits=12)
         one = stx.View(colour, depth, self.camera, name="a")
-        self.fails("invalidInput", "two views have the name 'a'", stx.Bundle, [one, one])
+        self.fails("usage", "two views have the name 'a'", stx.Bundle, [one, one])
         self.fails("invalidInput", "view", stx.Bundle, [])
 
     def test_masked_arrays(self):

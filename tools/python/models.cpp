@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <set>
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
@@ -83,10 +84,13 @@ ViewPointer makeView(const py::object& colour, const py::object& depth, const Ca
 
 py::object makeBundle(const std::vector<ViewPointer>& views, std::string title) {
     Bundle bundle;
+    std::set<std::string> names;
     for (const ViewPointer& view : views) {
         bundle.views.push_back(*view);
         std::string& name = bundle.views.back().name;
         if (name.empty()) name = fmt::format("view{:03}", bundle.views.size() - 1);
+        if (!names.insert(name).second)
+            refuse("two views have the name '{}'; names are unique in a bundle", name);
     }
     bundle.title = std::move(title);
     valueOf(bundle.check());
