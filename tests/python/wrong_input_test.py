@@ -133,7 +133,7 @@ class WrongInput(Case):
         self.fails("usage", "mode is 'wire'; one of surface, splat is expected", render, bundle, camera, mode="wire")
         self.fails("usage", "mode is 3; a text", render, bundle, camera, mode=3)
         self.fails("usage", "no stage 'x'", render, bundle, camera, without=["x"])
-        self.fails("usage", "ambient is negative", render, bundle, camera, ambient=-1)
+        self.fails("usage", "ambient is -1, -1, -1; light is 0 or more", render, bundle, camera, ambient=-1)
         for name, value in (("ambient", 0.9), ("specular", 0.5), ("shininess", 3), ("beyond_one", True)):
             self.fails("usage", f"{name} is of lighting; give lights, too", render, bundle, camera, **{name: value})
             render(bundle, camera, lights=[stx.Light("point", (0, 0, 1))], **{name: value})
