@@ -178,8 +178,8 @@ struct OutputFile::Impl {
     fs::path temporary;   ///< empty when bytes go straight to `fd`
     bool direct = false;  ///< stdout or a device
     bool committed = false;
-    bool waits =
-        false;  ///< whole, as others of OutputFiles are to become: only the name is missing
+    /// Whole: only its name is missing, until the others of OutputFiles are whole, too.
+    bool waits = false;
     std::uint64_t written = 0;
 
     ~Impl() {
