@@ -1,16 +1,18 @@
 #include "formats/files/deflate.hpp"
 
 #include <libdeflate.h>
+#ifdef STX_WITH_ISAL
+#include <isa-l/crc.h>
+#include <isa-l/igzip_lib.h>
+#include <sys/mman.h>
+#endif
 
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <mutex>
 #include <new>
-#ifdef STX_WITH_ISAL
-#include <isa-l/crc.h>
-#include <isa-l/igzip_lib.h>
-#endif
 
 namespace stx {
 namespace {
@@ -25,44 +27,78 @@ struct FreeDecompressor {
 using Decompressor = std::unique_ptr<libdeflate_decompressor, FreeDecompressor>;
 
 #ifdef STX_WITH_ISAL
-/// Where the compressor's state may lie in its room: in one of four blocks of 64 KiB.
-constexpr std::size_t kBlock = 1 << 16, kBlocks = 4;
+/// States of ISA-L's compressor, kept for the next piece. Version 2.30 on x86 hashes bits 16 to 47
+/// of its state's address where it means bytes 2 to 5 of a block of the data
+/// (isal_deflate_icf_body_hash_hist, the first literal), so that where a state lies now and then
+/// changes what is found: once in 100 to 200 pictures. All of these lie where that hash is 0.
+class States {
+  public:
+    static States& all() {
+        static States states;
+        return states;
+    }
+    /// All zeros. Throws std::bad_alloc.
+    [[nodiscard]] isal_zstream& take() {
+        const std::scoped_lock lock(mutex_);
+        if (free_.empty()) {
+            free_.reserve(++count_);  // so that give() need not
+            free_.push_back(make());
+        }
+        isal_zstream& state = *free_.back();
+        free_.pop_back();
+        std::memset(&state, 0, sizeof state);
+        return state;
+    }
+    void give(isal_zstream& state) noexcept {
+        const std::scoped_lock lock(mutex_);
+        free_.push_back(&state);
+    }
 
-/// The bucket of igzip's table of level 1 for four bytes: their CRC-32C, 12 bits of it.
-std::uint32_t bucketOf(const void* fourBytes) {
-    unsigned char bytes[4];
-    std::memcpy(bytes, fourBytes, sizeof bytes);
-    return crc32_iscsi(bytes, sizeof bytes, 0) & 0xfff;
-}
+  private:
+    /// As many bits of the hash as any version's table of level 1 takes.
+    static constexpr std::uint32_t kHash = 0x1fff;
+    /// Bits 16 to 47 of where to look first: what is mapped without a wish lies above.
+    static constexpr std::uint32_t kFirst = 0x7e900000;
+    /// So often a place is found taken before any is good enough.
+    static constexpr int kMostTaken = 100;
 
-/// The block for which the result is the same at every address. Version 2.30 on x86 hashes bits 16
-/// to 47 of its state's address where it means bytes 2 to 5 of the data, and so writes over some
-/// bucket (isal_deflate_icf_body_hash_hist, the first literal). That changes what is found where it
-/// is the bucket of the bytes from 0, 1 or 2 on: once in 1,400 times at most.
-std::size_t harmlessBlock(std::span<const std::byte> from, const std::uint8_t* room) {
-    std::size_t block = 0;
-    const auto harms = [&] {
-        const auto address = reinterpret_cast<std::uintptr_t>(room + block * kBlock);
-        const auto hashed = static_cast<std::uint32_t>(address >> 16);
-        const std::uint32_t bucket = bucketOf(&hashed);
-        for (std::size_t at = 0; at < 3 && at + 4 <= from.size(); ++at)
-            if (bucket == bucketOf(&from[at])) return true;
-        return false;
-    };
-    while (block + 1 < kBlocks && harms()) ++block;
-    return block;
-}
+    isal_zstream* make() {
+        for (int taken = 0; taken < kMostTaken; ++next_) {
+            if ((crc32_iscsi(reinterpret_cast<unsigned char*>(&next_), sizeof next_, 0) & kHash) !=
+                0)
+                continue;
+            const std::uintptr_t wanted = std::uintptr_t{next_} << 16;
+            void* const at = map(reinterpret_cast<void*>(wanted));
+            if (reinterpret_cast<std::uintptr_t>(at) >> 16 == next_) {
+                ++next_;
+                return static_cast<isal_zstream*>(at);
+            }
+            ::munmap(at, sizeof(isal_zstream));
+            ++taken;
+        }
+        return static_cast<isal_zstream*>(map(nullptr));
+    }
+    static void* map(void* wish) {
+        void* const at = ::mmap(wish, sizeof(isal_zstream), PROT_READ | PROT_WRITE,
+                                MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        if (at == MAP_FAILED) throw std::bad_alloc();
+        return at;
+    }
+
+    std::mutex mutex_;
+    std::vector<isal_zstream*> free_;
+    std::size_t count_ = 0;
+    std::uint32_t next_ = kFirst;
+};
 
 std::size_t compressFast(std::span<const std::byte> from, std::span<std::byte> to) {
     constexpr std::size_t kBuffer = ISAL_DEF_LVL1_DEFAULT;
     const auto buffer = std::make_unique<std::uint8_t[]>(kBuffer);
-    const auto room = std::make_unique_for_overwrite<std::uint8_t[]>(sizeof(isal_zstream) +
-                                                                     (kBlocks - 1) * kBlock);
-    static_assert(alignof(isal_zstream) <= alignof(std::max_align_t));
+    const auto give = [](isal_zstream* state) { States::all().give(*state); };
+    const std::unique_ptr<isal_zstream, decltype(give)> state(&States::all().take());
     // Zeros: isal_deflate_stateless_init() of version 2.30 leaves hist_bits as it is, and what was
     // there would choose how far matches look back, and so the bytes.
-    isal_zstream& stream =
-        *new (room.get() + harmlessBlock(from, room.get()) * kBlock) isal_zstream();
+    isal_zstream& stream = *state;
     isal_deflate_stateless_init(&stream);
     stream.hist_bits = 0;
     stream.level = 1;
