@@ -10,8 +10,9 @@ namespace stx {
 /// Four channels at once. GCC and clang make vector instructions of it on every processor.
 using Float4 = float __attribute__((vector_size(16)));
 
+using Int4 = std::int32_t __attribute__((vector_size(16)));
+
 inline Float4 floatsOf(glm::u8vec4 p) {
-    using Int4 = std::int32_t __attribute__((vector_size(16)));
     return __builtin_convertvector((Int4{p.r, p.g, p.b, p.a}), Float4);
 }
 

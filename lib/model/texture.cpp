@@ -112,7 +112,7 @@ void bleedColour(Texture& texture) {
                 auto& p = image.at(x, y);
                 if (p.a > 0) continue;
                 const Float4 filled = coarser.at(x);
-                if (filled[3] > 0.0f) p = coded(filled / filled[3]);
+                if (filled[3] > 0.0f) p = coded(filled);
             }
         }
     };
@@ -127,8 +127,9 @@ void bleedColour(Texture& texture) {
                 return p.a > 0 ? byAlpha(floatsOf(p) * (1.0f / 255.0f)) : kNothing;
             },
             [](Float4 c) {
-                const glm::vec3 colour = vectorOf(c);
-                return glm::u8vec4(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f, 0);
+                // Means of 0..1: rounding adds too little for a code of 256.
+                const auto code = __builtin_convertvector(c * 255.0f + 0.5f, Int4);
+                return glm::u8vec4(code[0], code[1], code[2], 0);
             });
     else
         bleed(

@@ -60,6 +60,21 @@ class Texture {
         return rgbaFloat()->data()[pixel].a;
     }
 
+    /// Calls visit(x) for the pixels of a row whose coverage is neither 0 nor 1, from left to
+    /// right.
+    template <class Visit>
+    void forEachInPart(int y, const Visit& visit) const {
+        const auto look = [&](auto row, const auto& isInPart) {
+            for (std::size_t x = 0; x < row.size(); ++x)
+                if (isInPart(row[x].a)) visit(static_cast<int>(x));
+        };
+        if (const auto* bytes = rgba8())
+            look(bytes->row(y),
+                 [](std::uint8_t a) { return static_cast<std::uint8_t>(a - 1) < 254; });
+        else
+            look(rgbaFloat()->row(y), [](float a) { return a > 0.0f && a < 1.0f; });
+    }
+
     /// See Image::moveTo().
     void moveTo(PixelSpool* spool) {
         std::visit([spool](auto& i) { i.moveTo(spool); }, image_);

@@ -22,26 +22,16 @@ Image<std::uint8_t> translucentInside(const Texture& texture, const Image<float>
         const float alpha = texture.alpha(texel);
         return alpha > 0.0f && alpha < 1.0f && hasPoint(depth.data()[texel]);
     };
-    // Most pictures have no such pixel at all: this is a loop that compilers make vectors of.
-    const auto mayBeTranslucent = [&](int y) {
-        const auto* bytes = texture.rgba8();
-        if (!bytes) return true;
-        int any = 0;
-        for (const glm::u8vec4 p : bytes->row(y))
-            any |= static_cast<int>(static_cast<std::uint8_t>(p.a - 1) < 254);
-        return any != 0;
-    };
     parallelFor(kInside, h - kInside, [&](int y) {
-        if (!mayBeTranslucent(y)) return;
-        for (int x = kInside; x + kInside < w; ++x) {
-            if (!isTranslucent(x, y)) continue;
-            bool all = true;
+        // Most pictures have few such pixels, or none.
+        texture.forEachInPart(y, [&](int x) {
+            bool all = x >= kInside && x + kInside < w;
             for (int dy = -kInside; all && dy <= kInside; ++dy) {
                 for (int dx = -kInside; all && dx <= kInside; ++dx)
                     all = isTranslucent(x + dx, y + dy);
             }
             inside.at(x, y) = all ? 1 : 0;
-        }
+        });
     });
     return inside;
 }

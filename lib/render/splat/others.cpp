@@ -105,7 +105,10 @@ class Lookup {
         const auto width = static_cast<float>(camera_.width - 1),
                    height = static_cast<float>(camera_.height - 1);
         const auto pixel = static_cast<float>(1.0 / std::min(camera_.fx, camera_.fy));
-        for (std::size_t n = 0; n < static_cast<std::size_t>(s.count); ++n) {
+        // Found first and looked at then, so that memory is waited for once and not for each.
+        std::array<Place, kSamples> places;
+        const auto count = static_cast<std::size_t>(s.count);
+        for (std::size_t n = 0; n < count; ++n) {
             const glm::vec3 h = (m.a0 + m.au * s.u[n] + m.av * s.v[n]) * s.depth[n] + m.b0 +
                                 m.bu * s.u[n] + m.bv * s.v[n];
             const float scale = camera_.orthographic ? 1.0f : 1.0f / h.z;
@@ -114,30 +117,43 @@ class Lookup {
             if (!(h.z > 0 && x > 0 && y > 0 && x < width && y < height)) return false;
             const float there = pixel * (camera_.orthographic ? 1.0f : h.z);
             if (there > kCoarsest * spacing * (orthographic ? 1.0f : s.depth[n])) return false;
-            if (!surfaceAt(static_cast<int>(x + 0.5f), static_cast<int>(y + 0.5f), h.z, there))
-                return false;
+            Place& p = places[n];
+            if (!find(static_cast<int>(x + 0.5f), static_cast<int>(y + 0.5f), p)) return false;
+            p.dist = h.z;
+            p.spacing = there;
+            __builtin_prefetch(p.depth);
+            __builtin_prefetch(p.slope);
         }
+        for (std::size_t n = 0; n < count; ++n)
+            if (!isSurface(places[n])) return false;
         return s.count > 0;
     }
 
   private:
-    [[nodiscard]] bool surfaceAt(int x, int y, float depth, float spacing) const {
+    struct Place {
+        const float* depth;
+        const Slope* slope;
+        float dist, spacing;  ///< of the point that is looked up
+    };
+    [[nodiscard]] bool find(int x, int y, Place& place) const {
         if (set_.views()[view_].unread) return false;
         const PageRectangle* r = set_.find(view_, x, y);
         // Padding repeats what other rectangles show, or what was pruned.
         if (!r || x < r->x0 || y < r->y0 || x >= r->x1 || y >= r->y1) return false;
         const auto page = static_cast<std::size_t>(r->page);
         const std::size_t texel = r->texel(x, y);
-        const float found = set_.pages()[page].depth->data()[texel];
-        if (!hasPoint(found)) return false;
-        const Slope slope = prepared_.pages[page].slopes[texel];
-        if (!(slope.u & Slope::kLinked)) return false;
+        place.depth = set_.pages()[page].depth->data() + texel;
+        place.slope = prepared_.pages[page].slopes.data() + texel;
+        return true;
+    }
+    [[nodiscard]] static bool isSurface(const Place& p) {
+        if (!hasPoint(*p.depth) || !(p.slope->u & Slope::kLinked)) return false;
         const auto steepness =
-            static_cast<float>(std::abs(int{slope.u}) + std::abs(int{slope.v})) / kSlopeScale;
+            static_cast<float>(std::abs(int{p.slope->u}) + std::abs(int{p.slope->v})) / kSlopeScale;
         if (steepness > kSteepestShown) return false;
         // Up to half a pixel beside.
-        return std::abs(depth - found) <
-               kSameDepth * depth + (kSameSpacings + 0.5f * steepness) * spacing;
+        return std::abs(p.dist - *p.depth) <
+               kSameDepth * p.dist + (kSameSpacings + 0.5f * steepness) * p.spacing;
     }
 
     const PageSet& set_;

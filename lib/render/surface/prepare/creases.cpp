@@ -78,6 +78,7 @@ void findCreases(const Source& s, Draft& d) {
     std::vector<std::vector<int>> found(static_cast<std::size_t>(s.height));
     parallelForBlocks(0, s.height, 32, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
+            const bool inside = y > 0 && y + 1 < s.height;
             const PixelRow row(d.q.row(y).data(), d.info.row(y).data(), s.width, 1,
                                Info::kLinkRight);
             for (int x = 0; x < s.width; ++x) {
@@ -87,7 +88,16 @@ void findCreases(const Source& s, Draft& d) {
                     return (pixels * axis.texel(q) + kSteps * s.step) * axis.qPerUnit(q) +
                            kNoises * s.noise * axis.relativeScale(q);
                 };
-                const float turn = least(kLeastTurn), bend = least(kLeastBend);
+                const float turn = least(kLeastTurn);
+                // Most bend by less than any crease, in whatever way they are linked.
+                const float* here = &d.q.at(x, y);
+                const auto bendOver = [&](std::ptrdiff_t step) {
+                    return std::abs(here[step] - 2 * q + here[-step]);
+                };
+                if (inside && x > 0 && x + 1 < s.width && bendOver(1) <= kOwnShare * turn &&
+                    bendOver(s.width) <= kOwnShare * turn)
+                    continue;
+                const float bend = least(kLeastBend);
                 const PixelRow column(&d.q.at(x, 0), &d.info.at(x, 0), s.height, s.width,
                                       Info::kLinkDown);
                 if (row.creased(x, turn, bend) || column.creased(y, turn, bend))

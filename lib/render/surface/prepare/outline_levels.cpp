@@ -1,6 +1,7 @@
 #include "lib/render/surface/prepare/outline_levels.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -32,7 +33,10 @@ class Levels {
     Levels(const Texture& texture, bool findsLines)
         : texture_(texture),
           findsLines_(findsLines),
-          lines_(static_cast<std::size_t>(texture.height())) {}
+          lines_(static_cast<std::size_t>(texture.height())) {
+        for (std::size_t a = 0; a < levelOfByte_.size(); ++a)
+            levelOfByte_[a] = levelOf(static_cast<float>(a) * (1.0f / 255.0f));
+    }
 
     Image<std::uint8_t> find() {
         Image<std::uint8_t> levels(width(), height());
@@ -53,20 +57,27 @@ class Levels {
         const int cx = std::clamp(x, 0, width() - 1), cy = std::clamp(y, 0, height() - 1);
         return texture_.alpha(static_cast<std::size_t>(cy) * width() + cx);
     }
-    static void set(std::uint8_t& level, float value) {
-        level = static_cast<std::uint8_t>(
+    static std::uint8_t levelOf(float value) {
+        return static_cast<std::uint8_t>(
             std::clamp(std::round(value / kLevelStep) + kLevelZero, 0.0f, 255.0f));
     }
 
     /// Sets the levels of a row, those of pixels that are covered in full or not at all to 1 or 0.
     void findLines(int y, Image<std::uint8_t>& levels) {
-        for (int x = 0; x < width(); ++x) {
-            const float a = alpha(x, y);
+        const auto to = levels.row(y);
+        if (const auto* bytes = texture_.rgba8())
+            std::ranges::transform(bytes->row(y), to.begin(),
+                                   [&](glm::u8vec4 p) { return levelOfByte_[p.a]; });
+        else
+            std::ranges::transform(texture_.rgbaFloat()->row(y), to.begin(),
+                                   [](const glm::vec4& p) { return levelOf(p.a); });
+        if (!findsLines_) return;
+        texture_.forEachInPart(y, [&](int x) {
             OutlineLine line;
-            const bool outline = findsLines_ && a > 0.0f && a < 1.0f && findLine(x, y, a, line);
-            set(levels.at(x, y), outline ? 0.5f + line.below : a);
-            if (outline) lines_[static_cast<std::size_t>(y)].push_back(line);
-        }
+            if (!findLine(x, y, alpha(x, y), line)) return;
+            to[static_cast<std::size_t>(x)] = levelOf(0.5f + line.below);
+            lines_[static_cast<std::size_t>(y)].push_back(line);
+        });
     }
 
     [[nodiscard]] bool findLine(int x, int y, float a, OutlineLine& line) const {
@@ -113,14 +124,15 @@ class Levels {
         forEach([&](const OutlineLine&, int x, int, glm::vec2& sum) {
             if (!(sum.y > 0.0f)) return;
             const float level = sum.x / sum.y, a = alpha(x, y);
-            if (a >= 1.0f) set(levels.at(x, y), std::max(level, 1.0f));
-            if (!(a > 0.0f)) set(levels.at(x, y), std::min(level, 0.0f));
+            if (a >= 1.0f) levels.at(x, y) = levelOf(std::max(level, 1.0f));
+            if (!(a > 0.0f)) levels.at(x, y) = levelOf(std::min(level, 0.0f));
             sum = glm::vec2(0.0f);
         });
     }
 
     const Texture& texture_;
     bool findsLines_;
+    std::array<std::uint8_t, 256> levelOfByte_{};  ///< of alpha as a byte
     std::vector<std::vector<OutlineLine>> lines_;  ///< by row
 };
 
