@@ -105,27 +105,30 @@ class Lookup {
         const auto width = static_cast<float>(camera_.width - 1),
                    height = static_cast<float>(camera_.height - 1);
         const auto pixel = static_cast<float>(1.0 / std::min(camera_.fx, camera_.fy));
-        // Found first and looked at then, so that memory is waited for once and not for each.
         std::array<Place, kSamples> places;
         const auto count = static_cast<std::size_t>(s.count);
-        for (std::size_t n = 0; n < count; ++n) {
-            const glm::vec3 h = (m.a0 + m.au * s.u[n] + m.av * s.v[n]) * s.depth[n] + m.b0 +
-                                m.bu * s.u[n] + m.bv * s.v[n];
-            const float scale = camera_.orthographic ? 1.0f : 1.0f / h.z;
-            const float x = h.x * scale, y = h.y * scale;
-            // False for what is not a number.
-            if (!(h.z > 0 && x > 0 && y > 0 && x < width && y < height)) return false;
-            const float there = pixel * (camera_.orthographic ? 1.0f : h.z);
-            if (there > kCoarsest * spacing * (orthographic ? 1.0f : s.depth[n])) return false;
-            Place& p = places[n];
-            if (!find(static_cast<int>(x + 0.5f), static_cast<int>(y + 0.5f), p)) return false;
-            p.dist = h.z;
-            p.spacing = there;
-            __builtin_prefetch(p.depth);
-            __builtin_prefetch(p.slope);
+        // One first, since most that show it not at all do not show that. The others are found
+        // first and looked at then, so that memory is waited for once and not for each.
+        for (std::size_t from = 0, to = 1; from < count; from = to, to = count) {
+            for (std::size_t n = from; n < to; ++n) {
+                const glm::vec3 h = (m.a0 + m.au * s.u[n] + m.av * s.v[n]) * s.depth[n] + m.b0 +
+                                    m.bu * s.u[n] + m.bv * s.v[n];
+                const float scale = camera_.orthographic ? 1.0f : 1.0f / h.z;
+                const float x = h.x * scale, y = h.y * scale;
+                // False for what is not a number.
+                if (!(h.z > 0 && x > 0 && y > 0 && x < width && y < height)) return false;
+                const float there = pixel * (camera_.orthographic ? 1.0f : h.z);
+                if (there > kCoarsest * spacing * (orthographic ? 1.0f : s.depth[n])) return false;
+                Place& p = places[n];
+                if (!find(static_cast<int>(x + 0.5f), static_cast<int>(y + 0.5f), p)) return false;
+                p.dist = h.z;
+                p.spacing = there;
+                __builtin_prefetch(p.depth);
+                __builtin_prefetch(p.slope);
+            }
+            for (std::size_t n = from; n < to; ++n)
+                if (!isSurface(places[n])) return false;
         }
-        for (std::size_t n = 0; n < count; ++n)
-            if (!isSurface(places[n])) return false;
         return s.count > 0;
     }
 
