@@ -30,7 +30,7 @@ using Decompressor = std::unique_ptr<libdeflate_decompressor, FreeDecompressor>;
 /// States of ISA-L's compressor, kept for the next piece. Version 2.30 on x86 hashes bits 16 to 47
 /// of its state's address where it means bytes 2 to 5 of a block of the data
 /// (isal_deflate_icf_body_hash_hist, the first literal), so that where a state lies now and then
-/// changes what is found: once in 100 to 200 pictures. All of these lie where that hash is 0.
+/// changes what is found: in up to one of 100 pictures. All of these lie where that hash is 0.
 class States {
   public:
     static States& all() {
