@@ -15,7 +15,7 @@ import tempfile
 
 import harness
 from harness import must, run, write
-from peak_test import PROGRAM, png
+from peaks import PROGRAM, png
 
 # From view to view the cameras go on by a part of a picture's width, and the wall's pattern repeats after as much: one colour
 # and one depth picture serve all of them.
