@@ -12,17 +12,34 @@
 namespace stx {
 namespace {
 
-/// How far beside its own place a view is looked at, as a share of the median distance: a depth
-/// that is off by one pixel there counts as a corner that is off by one pixel. It is what pages let
-/// a single view turn by.
+/// How far beside its own place a view that is alone is looked at, as a share of the median
+/// distance: what pages let it turn by.
 constexpr double kAside = 0.08;
 /// What is so near that it moves by more is out of any picture: the largest one has so many pixels.
 constexpr double kMostPixels = 65535;
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
+/// How far beside its own place what a view shows is looked at, as a share of its distance: a depth
+/// that is off by one pixel there counts as a corner that is off by one pixel. From wherever another
+/// view looks at the same side; a ball of 16 views with 7,000 triangles has 33.0 dB so, 25.9 with
+/// kAside, and spot with 20,000 has 43.3, 33.9.
+double asideOf(const Bundle& bundle, const Camera& camera, double distance) {
+    const glm::dvec3 middle = camera.position + distance * camera.forward();
+    double aside = kAside;
+    for (const ReferenceView& other : bundle.views) {
+        const glm::dvec3 towards = other.camera.orthographic
+                                       ? -other.camera.forward()
+                                       : glm::normalize(other.camera.position - middle);
+        const double along = -glm::dot(towards, camera.forward());
+        aside = std::max(aside, along > 0 ? std::sqrt(std::max(1 - along * along, 0.0)) : 0.0);
+    }
+    return aside;
+}
+
 /// Where corners are in pixels: across, down, and by how far they move between the view's own place
 /// and one beside it. Planes are planes there, too.
-std::vector<glm::vec3> inPixels(const Camera& camera, const ViewSurface& surface) {
+std::vector<glm::vec3> inPixels(const Bundle& bundle, const Camera& camera,
+                                const ViewSurface& surface) {
     std::vector<glm::dvec3> seen;
     std::vector<double> distances;
     for (const glm::vec3& world : surface.positions) {
@@ -30,12 +47,13 @@ std::vector<glm::vec3> inPixels(const Camera& camera, const ViewSurface& surface
         seen.push_back(camera.project(glm::conjugate(camera.orientation) * relative));
         distances.push_back(seen.back().z);
     }
-    const double aside = kAside * camera.fx * medianOf(std::move(distances));
+    const double distance = medianOf(std::move(distances));
+    const double aside = asideOf(bundle, camera, distance) * camera.fx;
     std::vector<glm::vec3> out;
     out.reserve(seen.size());
     for (std::size_t i = 0; i < seen.size(); ++i) {
         const double z = seen[i].z;
-        const double moves = camera.orthographic ? kAside * camera.fx * z : aside / z;
+        const double moves = camera.orthographic ? aside * z : aside * distance / z;
         out.emplace_back(surface.pixels[i].x, surface.pixels[i].y,
                          std::isnan(moves) ? 0.0 : std::clamp(moves, -kMostPixels, kMostPixels));
     }
@@ -60,8 +78,8 @@ void dropCorners(ViewSurface& surface) {
     surface.positions = std::move(positions);
 }
 
-void simplify(const Camera& camera, double share, ViewSurface& surface) {
-    const std::vector<glm::vec3> places = inPixels(camera, surface);
+void simplify(const Bundle& bundle, const Camera& camera, double share, ViewSurface& surface) {
+    const std::vector<glm::vec3> places = inPixels(bundle, camera, surface);
     std::vector<std::uint32_t> fewer(surface.triangles.size());
     const auto wanted =
         static_cast<std::size_t>(share * static_cast<double>(surface.triangles.size() / 3));
@@ -88,7 +106,7 @@ Result<void> takeFewerTriangles(const Bundle& bundle, std::size_t most,
     const double share = static_cast<double>(most) / static_cast<double>(before);
     parallelFor(0, surfaces.size(), [&](std::size_t at) {
         if (job.cancelled || surfaces[at].triangles.empty()) return;
-        simplify(bundle.views[at].camera, share, surfaces[at]);
+        simplify(bundle, bundle.views[at].camera, share, surfaces[at]);
     });
     STX_CHECK(job.checkCancelled());
     if (const std::size_t left = count(); left > most)

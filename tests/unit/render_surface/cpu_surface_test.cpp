@@ -251,6 +251,46 @@ TEST(CpuSurface, MapsBetweenBothProjections) {
     EXPECT_GT(psnr(draw(bundleOf(ball, all), orthographic), ball, orthographic), 34.0);
 }
 
+/// The walls, the floor and the ceiling of a room, from inside.
+std::optional<Hit> room(glm::dvec3 from, glm::dvec3 along) {
+    const glm::dvec3 least(-3, -2, -4), most(2.5, 1.7, 3.6);
+    Hit nearest{1e9, {}, {}};
+    for (int axis = 0; axis < 3; ++axis) {
+        const double t = ((along[axis] > 0 ? most : least)[axis] - from[axis]) / along[axis];
+        if (!(t > 0 && t < nearest.t)) continue;
+        nearest.t = t;
+        nearest.normal = glm::dvec3(0);
+        nearest.normal[axis] = along[axis] > 0 ? -1 : 1;
+    }
+    nearest.colour = paint(from + nearest.t * along);
+    return nearest;
+}
+
+// Planar pieces of walls reach behind a camera whose field of view is wide.
+TEST(CpuSurface, WallsAreWholeHoweverWideThePicture) {
+    const glm::dvec3 eye(0.1, -0.2, 0.3);
+    std::vector<Camera> cameras;
+    for (const glm::dvec3 side : {glm::dvec3(1, 0, 0), glm::dvec3(0, 1e-3, 1), glm::dvec3(0, 1, 0)})
+        for (const double sign : {-1.0, 1.0})
+            cameras.push_back(at(eye, eye + sign * side, 96, glm::radians(96.0)));
+    const Bundle bundle = bundleOf(room, cameras);
+    for (const double degrees : {120.0, 150.0, 165.0}) {
+        Camera wide = at(eye, {-1, 0.3, -2}, 120, glm::radians(degrees));
+        const Frame frame = draw(bundle, wide);
+        int open = 0, off = 0;
+        for (int y = 0; y < wide.height; ++y) {
+            for (int x = 0; x < wide.width; ++x) {
+                open += frame.colour.at(x, y).a < 0.999f;
+                const Ray r = rayOf(wide, x + 0.5, y + 0.5);
+                const double truth = room(r.from, r.along)->t * glm::dot(r.along, wide.forward());
+                off += !(std::abs(frame.depth.at(x, y) - truth) < 0.1 * truth);
+            }
+        }
+        EXPECT_EQ(open, 0) << degrees;
+        EXPECT_LT(off, 60) << degrees;
+    }
+}
+
 TEST(CpuSurface, GeneralIntrinsics) {
     Camera novel = at({0.7, 0.5, 2.8});
     novel.fx *= 1.2;

@@ -367,6 +367,27 @@ TEST(SurfacesGlb, WithFewerTrianglesIsTheSameSurfaces) {
               std::filesystem::file_size(folder.path() / "a.glb"));
 }
 
+/// Views from all sides show each other's dents.
+TEST(SurfacesGlb, WithFewTrianglesKeepsItsShape) {
+    const TemporaryFolder folder;
+    Job job;
+    const Bundle bundle = torusViews(96);
+    const auto few =
+        writeSurfaces(folder.path() / "a.glb", bundle, {.mostTriangles = 1500}, job);
+    ASSERT_TRUE(few) << few.error().text();
+    const auto mesh = readMesh(folder.path() / "a.glb", job);
+    ASSERT_TRUE(mesh) << mesh.error().text();
+    double sum = 0, area = 0;
+    for (const auto& t : mesh->triangles) {
+        const glm::dvec3 a = mesh->positions[t[0]], b = mesh->positions[t[1]],
+                         c = mesh->positions[t[2]];
+        const double here = glm::length(glm::cross(b - a, c - a));
+        sum += here * fromTorus((a + b + c) / 3.0);
+        area += here;
+    }
+    EXPECT_LT(sum / area, 0.015);
+}
+
 TEST(SurfacesGlb, WithFewerTrianglesJoinsNoParts) {
     const TemporaryFolder folder;
     Job job;

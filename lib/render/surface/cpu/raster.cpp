@@ -1,6 +1,7 @@
 #include "lib/render/surface/cpu/raster.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -39,6 +40,27 @@ struct Projection {
     }
 };
 
+HWY_NOINLINE void drawLeaves(Target& t, const Warp& warp, std::span<const Leaf> leaves, float grow,
+                             Extent& extent);
+
+/// Draws a leaf cell by cell. For one that reaches behind the camera, which as a whole has no place
+/// in the frame: its cells in front have.
+HWY_NOINLINE void drawCellsOf(const Leaf& leaf, Target& t, const Warp& warp, float grow,
+                              Extent& extent) {
+    std::array<Leaf, kBlock> row;
+    for (int j = 0; j < leaf.size; ++j) {
+        for (int i = 0; i < leaf.size; ++i)
+            row[static_cast<std::size_t>(i)] = {
+                static_cast<std::uint16_t>(leaf.x + i),
+                static_cast<std::uint16_t>(leaf.y + j),
+                1,
+                leaf.q0 + static_cast<float>(i) * leaf.qx + static_cast<float>(j) * leaf.qy,
+                leaf.qx,
+                leaf.qy};
+        drawLeaves(t, warp, std::span(row).first(leaf.size), grow, extent);
+    }
+}
+
 /// Draws leaves, whose edges move out by `grow` samples.
 HWY_NOINLINE void drawLeaves(Target& t, const Warp& warp, std::span<const Leaf> leaves, float grow,
                              Extent& extent) {
@@ -71,6 +93,11 @@ HWY_NOINLINE void drawLeaves(Target& t, const Warp& warp, std::span<const Leaf> 
         projection.corner(right, bottom, hn::Add(q, hn::Add(alongX, alongY)), 2, p);
         projection.corner(left, bottom, hn::Add(q, alongY), 3, p);
         drawPolygons<false>(t, p, extent);
+        std::uint32_t behind = bitsOf(hn::AndNot(p.there, hn::FirstN(d, count)));
+        for (; behind; behind &= behind - 1) {
+            const Leaf& leaf = leaves[first + static_cast<std::size_t>(std::countr_zero(behind))];
+            if (leaf.size > 1) drawCellsOf(leaf, t, warp, grow, extent);
+        }
     }
 }
 
