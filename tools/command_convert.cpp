@@ -576,7 +576,8 @@ void addConvert(CommandLine& line, Program& program) {
            "MPEG-4: startTime and stopTime that come with a later access unit count from the "
            "start, and not from that unit");
     c.under(MeshViewOptions::kHeading)
-        .option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
+        .option("--texture", o->open.texture,
+                "Texture of a mesh, in place of its own; all are taken for sRGB")
         .reads("IMAGE");
     addCodingOptions(c.under("Coding"), o);
     addEnvironmentOptions(

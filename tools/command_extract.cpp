@@ -354,7 +354,8 @@ void addExtract(CommandLine& line, Program& program) {
     c.option("--as", o->as,
              "What a file holds: points (.ply, .drc), splats (.ply, .spz, .glb), surfaces (.glb), "
              "rgbd (.png, .jpg: colour on the left, depth on the right) or pair (colour, and depth "
-             "in NAME_depth.jpg) (default: .ply and .drc points, .spz splats, .glb surfaces, "
+             "in NAME_depth.png or NAME_depth.jpg) (default: .ply and .drc points, .spz splats, "
+             ".glb surfaces, "
              "NAME_rgbd.png rgbd, other pictures pair). Depth of pictures is white near")
         .oneOf({"points", "splats", "surfaces", "rgbd", "pair"});
     c.option("--view", o->view, "Of a picture with depth: reference view K (default: the first)")

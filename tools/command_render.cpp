@@ -162,8 +162,9 @@ Result<void> prepareAround(RenderOptions& o, const Command& command, Program& pr
     STX_TRY(const auto size, parseSize(o.camera.size, program.job.limits));
     if (size.x != 2 * size.y || size.y < 2)
         return fail(ErrorCode::usage,
-                    "--size is {}x{}; an equirectangular picture is twice as wide as high", size.x,
-                    size.y);
+                    "--size is {}x{}; an equirectangular picture is twice as wide as high, 4x2 at "
+                    "least",
+                    size.x, size.y);
     return {};
 }
 
@@ -441,7 +442,8 @@ void addOutput(Command c, RenderOptions& o) {
     c.flag("--times-from-start", o.open.timesFromStart,
            "MPEG-4: startTime and stopTime that come with a later access unit count from the "
            "start, and not from that unit");
-    c.option("--texture", o.open.texture, "Texture of a mesh, in place of those that it names")
+    c.option("--texture", o.open.texture,
+             "Texture of a mesh, in place of its own; all are taken for sRGB")
         .reads("IMAGE");
 }
 

@@ -7,6 +7,7 @@
 #include "formats/any/open.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/files/files.hpp"
+#include "formats/images/frames.hpp"
 #include "formats/imagesets/set_views.hpp"
 #include "lib/model/median_distance.hpp"
 #include "lib/model/peak_memory.hpp"
@@ -160,6 +161,7 @@ Result<void> checkPictures(const RenderOptions& o, const RenderSettings& asked,
     for (std::size_t i = 0; i < pictures.size(); ++i) {
         const Camera& camera = pictures[i].camera;
         STX_CHECK(within(fmt::format("camera {}", i), camera.check()));
+        if (o.output != "-") STX_CHECK(checkFrameSize(o.output, camera.width, camera.height));
         largest = std::max(largest, static_cast<std::uint64_t>(camera.width) * camera.height);
     }
     STX_CHECK(checkFilmSize(o, pictures));

@@ -245,6 +245,10 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
             return openRenderable(files.front().path, options, job);
         }
         case FileKind::image:
+            return fail(ErrorCode::invalidInput,
+                        "'{}' is a picture, and nothing says where its depth is; name its depth "
+                        "picture with --depth FILE",
+                        path.string());
         case FileKind::unknown:
             return tl::unexpected(unknownInput(path));
     }

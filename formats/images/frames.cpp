@@ -81,11 +81,6 @@ Result<void> writeByModule(const Rgba8Image& rgba, FrameFormat format, const Out
         request.channels = 3;
         request.values = rgb.data();
     }
-    constexpr int kWebpSide = 16383;
-    if (format == FrameFormat::webp && std::max(rgba.width(), rgba.height()) > kWebpSide)
-        return fail(ErrorCode::usage,
-                    "a WebP picture of {}x{} is asked for; {} a side are possible", rgba.width(),
-                    rgba.height(), kWebpSide);
     codecs::Failure failure;
     if (!codecs->encode(request, failure))
         return fail(static_cast<ErrorCode>(failure.code), "{}", failure.message);
@@ -140,6 +135,18 @@ Result<FrameFormat> frameFormat(const std::filesystem::path& path) {
                 "cannot write a picture as '{}'; its name must end in .png, .jpg, .exr, .tif or "
                 ".webp",
                 path.string());
+}
+
+Result<void> checkFrameSize(const std::filesystem::path& path, int width, int height) {
+    STX_TRY(const FrameFormat format, frameFormat(path));
+    constexpr int kJpegSide = 65500, kWebpSide = 16383;
+    const bool jpeg = format == FrameFormat::jpeg;
+    const int most = jpeg ? kJpegSide : kWebpSide;
+    if ((!jpeg && format != FrameFormat::webp) || std::max(width, height) <= most) return {};
+    return fail(ErrorCode::usage,
+                "'{}': a {} picture of {}x{} is asked for; {} a side are possible, of PNG and "
+                "OpenEXR more",
+                path.string(), jpeg ? "JPEG" : "WebP", width, height, most);
 }
 
 Rgba8Image pictureOf(const Frame& frame, FrameFormat format,
@@ -213,6 +220,7 @@ Result<void> writeExrFrame(const ExrFrame& frame, const std::filesystem::path& p
 Result<void> writePicture(const Rgba8Image& picture, const std::filesystem::path& path,
                           const FrameOptions& options) {
     STX_TRY(const FrameFormat format, frameFormat(path));
+    STX_CHECK(checkFrameSize(path, picture.width(), picture.height()));
     STX_TRY(auto file, OutputFile::create(path, {.noClobber = options.noClobber}));
     if (format == FrameFormat::tiff || format == FrameFormat::webp) {
         STX_CHECK(within(fmt::format("'{}'", path.string()),

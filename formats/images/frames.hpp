@@ -19,7 +19,7 @@ namespace stx {
 /// Files that a rendered picture can become.
 enum class FrameFormat {
     png,   ///< 8-bit sRGB, straight alpha, tagged
-    jpeg,  ///< 8-bit sRGB without alpha; lossy
+    jpeg,  ///< 8-bit sRGB without alpha; lossy; at most 65500 pixels a side
     exr,   ///< linear, premultiplied; depth, normals and albedo with it
     tiff,  ///< as PNG
     webp,  ///< as PNG, lossless; at most 16383 pixels a side
@@ -28,6 +28,9 @@ enum class FrameFormat {
 /// The format by a name's ending: .png, .jpg, .jpeg, .exr, .tif, .tiff, .webp in any case; "-" is
 /// PNG. Error (usage) else.
 [[nodiscard]] Result<FrameFormat> frameFormat(const std::filesystem::path& path);
+
+/// Error (usage) for a picture that has no room in the format of its name.
+[[nodiscard]] Result<void> checkFrameSize(const std::filesystem::path& path, int width, int height);
 
 struct FrameOptions {
     /// Put behind the picture, which gets opaque: sRGB-coded 0..1. Without it PNG and EXR keep

@@ -140,6 +140,10 @@ FileColours coloursOfPng(ByteSpan file) {
     }
     if (!cicp.empty()) {
         const unsigned primaries = byteAt(cicp, 0), transfer = byteAt(cicp, 1);
+        if (byteAt(cicp, 2) != 0 || byteAt(cicp, 3) != 1)
+            return {{},
+                    "its cICP says that its colours are of narrow range or not RGB, which is not "
+                    "converted: they are taken for sRGB of full range"};
         const auto points = pointsOf(primaries);
         const auto curve = curveOf(transfer);
         if (points && curve) return madeOf(*points, *curve);

@@ -20,9 +20,9 @@ constexpr double kMostPixels = 65535;
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 /// How far beside its own place what a view shows is looked at, as a share of its distance: a depth
-/// that is off by one pixel there counts as a corner that is off by one pixel. From wherever another
-/// view looks at the same side; a ball of 16 views with 7,000 triangles has 33.0 dB so, 25.9 with
-/// kAside, and spot with 20,000 has 43.3, 33.9.
+/// that is off by one pixel there counts as a corner that is off by one pixel. From wherever
+/// another view looks at the same side; a ball of 16 views with 7,000 triangles has 33.0 dB
+/// so, 25.9 with kAside, and spot with 20,000 has 43.3, 33.9.
 double asideOf(const Bundle& bundle, const Camera& camera, double distance) {
     const glm::dvec3 middle = camera.position + distance * camera.forward();
     double aside = kAside;

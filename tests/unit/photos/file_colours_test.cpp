@@ -25,8 +25,9 @@ std::string textOf(const Bytes& bytes) {
     return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-std::string cicp(int primaries, int transfer) {
-    const char body[] = {static_cast<char>(primaries), static_cast<char>(transfer), 0, 1};
+std::string cicp(int primaries, int transfer, char matrix = 0, char fullRange = 1) {
+    const char body[] = {static_cast<char>(primaries), static_cast<char>(transfer), matrix,
+                         fullRange};
     return chunk("cICP", std::string(body, 4));
 }
 std::string gamma(int value) {
@@ -82,6 +83,9 @@ TEST(FileColours, OfPngBecomeSrgb) {
         glm::ivec3 expected;
         std::string_view note;
     };
+    constexpr std::string_view kNotFullRgb =
+        "its cICP says that its colours are of narrow range or not RGB, which is not converted: "
+        "they are taken for sRGB of full range";
     const Case cases[] = {
         {"nothing", "", given, ""},
         {"sRGB", chunk("sRGB", std::string(1, '\0')) + gamma(100000), given, ""},
@@ -95,6 +99,8 @@ TEST(FileColours, OfPngBecomeSrgb) {
         {"PQ", cicp(9, 16), given,
          "its colours are coded by the primaries 9 and the transfer function 16 of ITU-T H.273, "
          "which are not converted: they are taken for sRGB"},
+        {"narrow range", cicp(12, 13, 0, 0), given, kNotFullRgb},
+        {"Y'CbCr", cicp(1, 13, 1), given, kNotFullRgb},
         {"no gamma", gamma(0), given,
          "what it says of its colours (gAMA, cHRM) is of none: they are taken for sRGB"},
         {"no primaries", chunk("cHRM", std::string(32, '\0')), given,

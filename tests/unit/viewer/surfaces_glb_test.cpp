@@ -372,8 +372,7 @@ TEST(SurfacesGlb, WithFewTrianglesKeepsItsShape) {
     const TemporaryFolder folder;
     Job job;
     const Bundle bundle = torusViews(96);
-    const auto few =
-        writeSurfaces(folder.path() / "a.glb", bundle, {.mostTriangles = 1500}, job);
+    const auto few = writeSurfaces(folder.path() / "a.glb", bundle, {.mostTriangles = 1500}, job);
     ASSERT_TRUE(few) << few.error().text();
     const auto mesh = readMesh(folder.path() / "a.glb", job);
     ASSERT_TRUE(mesh) << mesh.error().text();
