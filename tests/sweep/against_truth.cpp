@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "lib/registration/disagreement.hpp"
+#include "lib/render/around/around.hpp"
 #include "lib/render/surface/prepare/source.hpp"
 #include "tests/noisy_depth.hpp"
 #include "tests/sweep/measures.hpp"
@@ -38,6 +39,36 @@ Outcome openWhereSeen(Pictures& pictures) {
         out.what += fmt::format("{}{} {:.2f} %", i ? ", " : "open: ", kWayNames[i], *open);
     }
     return out;
+}
+
+// From amid a room that two places see all around: surfaces reach behind the camera.
+Outcome openInWidePictures(Pictures& pictures) {
+    Captured wide = pictures.captured();
+    if (wide.from.shape != SweepCase::room) return std::nullopt;
+    const auto turn = [&](int salt) {
+        const auto angle = [&](int k) {
+            return glm::radians(static_cast<double>(pick(pictures, salt + k, 360)));
+        };
+        return glm::dquat(glm::dvec3(angle(0), angle(1), angle(2)));
+    };
+    wide.bundle.views.clear();
+    for (const double beside : {-0.3, 0.2}) {
+        Camera pose;
+        pose.position = {beside, 0.1, 0.6 - beside};
+        pose.orientation = turn(beside < 0 ? 353 : 359);
+        for (const Camera& face : facesAround(pose, std::clamp(wide.from.width, 24, 96) / 2)) {
+            wide.bundle.views.push_back(look(wide.scene, face));
+            wide.bundle.views.back().name = fmt::format("face{}", wide.bundle.views.size());
+        }
+    }
+    const double across = glm::radians(140.0 + pick(pictures, 349, 30));
+    wide.novel = Camera::fromFieldOfView({0, 0, 0.6}, turn(367), {across, across}, false, 96, 96);
+    wide.truth = look(wide.scene, wide.novel);
+    Pictures shown(wide);
+    auto open = openWhereSeen(shown);
+    if (open && *open)
+        (*open)->what += fmt::format("; {:.0f} degrees across", glm::degrees(across));
+    return open;
 }
 
 Outcome drawnWhereEmpty(Pictures& pictures) {

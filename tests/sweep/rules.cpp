@@ -14,6 +14,8 @@ const std::vector<SweepRule>& rules() {
         {"open", "no mode or quality leaves a place open that two views see", 0.5, "%",
          "half a percent of them: pixels beside outlines that nine pixels of a view do not tell", 1,
          measures::openWhereSeen},
+        {"wide", "pictures from amid a room leave no place open that two views see", 0.5, "%",
+         "as for open places", 0.5, measures::openInWidePictures},
         {"empty", "nothing is drawn where nothing is", 0.5, "%", "as for open places", 1,
          measures::drawnWhereEmpty},
         {"filled-empty", "nothing is filled in where views see that nothing is", 0.5, "%",
