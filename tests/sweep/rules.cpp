@@ -14,8 +14,6 @@ const std::vector<SweepRule>& rules() {
         {"open", "no mode or quality leaves a place open that two views see", 0.5, "%",
          "half a percent of them: pixels beside outlines that nine pixels of a view do not tell", 1,
          measures::openWhereSeen},
-        {"wide", "pictures from amid a room leave no place open that two views see", 0.5, "%",
-         "as for open places", 0.5, measures::openInWidePictures},
         {"empty", "nothing is drawn where nothing is", 0.5, "%", "as for open places", 1,
          measures::drawnWhereEmpty},
         {"filled-empty", "nothing is filled in where views see that nothing is", 0.5, "%",
@@ -75,6 +73,8 @@ const std::vector<SweepRule>& rules() {
          measures::exactViewsDisagree},
         {"chosen", "the views that a picture needs draw what all do", 0, "pixels", "as promised",
          0.3, measures::chosenViews},
+        {"wide", "pictures from amid a room leave no place open that two views see", 0.5, "%",
+         "as for open places", 0.5, measures::openInWidePictures},
     };
     return kRules;
 }
