@@ -332,11 +332,8 @@ void MeshBuilder::roundPositions() {
             "rounds them, in steps of up to {:.2g}: where that shows, move the model to the origin "
             "or save it as OBJ; the origin {} {} {} is kept beside them",
             largestStep(), mesh_.origin.x, mesh_.origin.y, mesh_.origin.z));
-    else if (mesh_.origin != glm::dvec3(0.0))
-        job_.note(fmt::format(
-            "the coordinates are too large for 32-bit floats: the origin {} {} {} is subtracted "
-            "before they are rounded, and kept beside them",
-            mesh_.origin.x, mesh_.origin.y, mesh_.origin.z));
+    else
+        noteOrigin(mesh_.origin, job_);
     mesh_.positions.reserve(positions_.size());
     for (auto& p : positions_) {
         mesh_.positions.emplace_back(p - origin);
@@ -407,6 +404,14 @@ Result<Mesh> MeshBuilder::finish() {
     dropUnusedTextures();
     STX_CHECK(mesh_.check());
     return std::move(mesh_);
+}
+
+void noteOrigin(glm::dvec3 origin, Job& job) {
+    if (origin == glm::dvec3(0.0)) return;
+    job.note(
+        fmt::format("the coordinates are too large for 32-bit floats: the origin {} {} {} is "
+                    "subtracted before they are rounded, and kept beside them",
+                    origin.x, origin.y, origin.z));
 }
 
 void addFlatNormals(MeshPart& part) {

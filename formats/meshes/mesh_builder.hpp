@@ -79,6 +79,9 @@ class MeshBuilder {
     std::uint64_t points_ = 0, brokenPoints_ = 0;
 };
 
+/// Says that coordinates count from an origin, unless it is 0.
+void noteOrigin(glm::dvec3 origin, Job& job);
+
 /// Gives each vertex the normal of its triangle; a vertex of several unlike triangles is doubled.
 void addFlatNormals(MeshPart& part);
 

@@ -205,11 +205,6 @@ Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& given, Job& job,
         formatOf(path, ByteSpan(bytes).first(std::min<std::size_t>(bytes.size(), 4096)));
     auto mesh = readFormat(format, bytes, path, job, options);
     if (!mesh) return tl::unexpected(mesh.error().at(where));
-    if (mesh->splats) {
-        // Clouds are large: not both at a time.
-        bytes = {};
-        STX_CHECK(placeSplats(*mesh, job));
-    }
 
     if (!options.texture.empty()) {
         if (mesh->uvs.empty())

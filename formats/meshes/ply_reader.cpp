@@ -459,6 +459,11 @@ class PlyReader {
 
 Result<Mesh> readPly(ByteSpan bytes, ModelFiles& files) {
     STX_TRY(auto header, readPlyHeader(bytes));
+    if (isPackedSplatPly(header))
+        return fail(ErrorCode::unsupported,
+                    "the splats are packed as PlayCanvas does it (.compressed.ply), which is not "
+                    "read here; splat-transform (@playcanvas/splat-transform of npm) turns the "
+                    "file into a plain .ply");
     if (isSplatPly(header)) return readSplatPly(bytes, header, files.job());
     return PlyReader(bytes, std::move(header), files).read();
 }

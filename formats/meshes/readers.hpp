@@ -23,19 +23,30 @@ enum class AssimpFormat { obj, stl, dae, fbx };
 
 // Clouds of Gaussians, in splats/.
 
-/// A mesh that is drawn as this cloud, after dropBroken(); it has no positions yet. Errors: no
-/// splat is left.
-[[nodiscard]] Result<Mesh> meshOfSplats(SplatCloud cloud, Job& job);
-/// Gives such a mesh the centres of its splats as positions, and as points those that frame it: of
-/// splats that hide half or more of what is behind them. Errors: memory over the limit.
-[[nodiscard]] Result<void> placeSplats(Mesh& mesh, Job& job);
+/// Splats as a file has them: their centres are doubles until it is known what they count from.
+struct FileSplats {
+    SplatCloud cloud;  ///< its positions come later
+    std::vector<glm::dvec3> centres;
+
+    /// As SplatCloud::resize().
+    [[nodiscard]] Result<void> resize(std::size_t count, int degree, const Limits& limits);
+};
+
+/// A mesh that is drawn as these splats, after dropBroken(): positions are their centres, from an
+/// origin where floats would lose too much (originFor(); a note says so), and points are those that
+/// frame it: of splats that hide half or more of what is behind them, or, where none does, half as
+/// much as the one that hides most. Errors: no splat is left,
+/// memory over the limit.
+[[nodiscard]] Result<Mesh> meshOfSplats(FileSplats splats, Job& job);
 
 /// Whether a PLY file is a cloud of splats: its vertices have opacity, scales, a rotation and a
 /// colour of degree 0 (INRIA's names). Without one of these it is a plain point cloud.
 [[nodiscard]] bool isSplatPly(const PlyHeader& header);
-/// Reads such a file; values may be of any type. Errors: (invalidInput) lists among the vertices,
-/// fewer bytes than vertices, harmonics of no whole degree, memory over the limit; (unsupported)
-/// text, other elements before the vertices.
+/// Whether the splats of a PLY file are packed as PlayCanvas does it (.compressed.ply).
+[[nodiscard]] bool isPackedSplatPly(const PlyHeader& header);
+/// Reads a file of isSplatPly(); values may be of any type. Errors: (invalidInput) lists among the
+/// vertices, fewer bytes than vertices, harmonics of no whole degree, memory over the limit;
+/// (unsupported) text, other elements before the vertices.
 [[nodiscard]] Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job);
 
 /// Reads Niantic's SPZ, versions 2 and 3. Errors: (invalidInput) no gzip, damage, other lengths

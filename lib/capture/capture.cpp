@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <numeric>
 #include <optional>
 
 #include "lib/base/parallel.hpp"
@@ -229,12 +228,40 @@ std::string nameOf(std::size_t view, const CaptureSettings& settings) {
     return settings.names.empty() ? fmt::format("view{:03}", view) : settings.names[view];
 }
 
-void noteBlind(std::size_t view, Job& job) {
-    job.note(fmt::format("view {} sees nothing of the model and was left out", view));
+/// What a view has of the model.
+enum class Sight {
+    nothing,
+    faint,  ///< splats, but nowhere one half of what is behind them is hidden: no depth
+    points
+};
+
+Sight sightOf(const Mesh& mesh, const ReferenceView& view) {
+    if (view.pointCount() > 0) return Sight::points;
+    for (std::size_t i = 0; mesh.splats && i < view.depth.count(); ++i)
+        if (view.texture.alpha(i) > 0) return Sight::faint;
+    return Sight::nothing;
+}
+
+/// Says which views are left out.
+void noteBlind(const std::vector<Sight>& sights, Job& job) {
+    for (std::size_t i = 0; i < sights.size(); ++i) {
+        if (sights[i] == Sight::points) continue;
+        job.note(fmt::format("view {} sees {} and was left out", i,
+                             sights[i] == Sight::nothing
+                                 ? "nothing of the model"
+                                 : "only splats that let half or more of what is behind them "
+                                   "through, has no depth"));
+    }
 }
 
 /// No camera sees the model.
-Error blindError(const std::vector<Camera>& cameras) {
+Error blindError(const std::vector<Camera>& cameras, const std::vector<Sight>& sights) {
+    if (std::ranges::find(sights, Sight::faint) != sights.end())
+        return {ErrorCode::invalidInput,
+                "the splats let half or more of what is behind them through wherever the cameras "
+                "see them, so that no view has depth; stx render draws such a cloud, and views "
+                "need one that is denser or more opaque",
+                {}};
     const auto tooSmall = [](const Camera& c) { return std::max(c.width, c.height) < 16; };
     if (std::ranges::all_of(cameras, tooSmall))
         return {ErrorCode::invalidInput,
@@ -288,15 +315,15 @@ class CapturedViews : public ViewTable {
     Faint& faint_;
 };
 
-/// The cameras that see something, by their numbers.
-Result<std::vector<std::size_t>> seeing(const Mesh& mesh, const std::vector<Camera>& cameras,
-                                        const CaptureSettings& settings, Job& job) {
-    std::vector<Result<bool>> sees(cameras.size());
+/// What the cameras see.
+Result<std::vector<Sight>> sightsOf(const Mesh& mesh, const std::vector<Camera>& cameras,
+                                    const CaptureSettings& settings, Job& job) {
+    std::vector<Result<Sight>> sees(cameras.size());
     const auto look = [&](std::int64_t i) {
         const auto at = static_cast<std::size_t>(i);
-        sees[at] = [&]() -> Result<bool> {
+        sees[at] = [&]() -> Result<Sight> {
             STX_TRY(const auto view, captureView(mesh, cameras[at], {}, settings, job));
-            return view.pointCount() > 0;
+            return sightOf(mesh, view);
         }();
     };
     const auto count = static_cast<std::int64_t>(cameras.size());
@@ -304,12 +331,12 @@ Result<std::vector<std::size_t>> seeing(const Mesh& mesh, const std::vector<Came
         for (std::int64_t i = 0; i < count; ++i) look(i);
     else
         parallelFor(0, count, look);
-    std::vector<std::size_t> numbers;
-    for (std::size_t i = 0; i < sees.size(); ++i) {
-        if (!sees[i]) return propagate(sees[i]);
-        if (*sees[i]) numbers.push_back(i);
+    std::vector<Sight> sights;
+    for (auto& sight : sees) {
+        if (!sight) return propagate(sight);
+        sights.push_back(*sight);
     }
-    return numbers;
+    return sights;
 }
 
 }  // namespace
@@ -339,15 +366,14 @@ Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& camer
     else
         parallelFor(0, n, capture);
     Bundle bundle;
+    std::vector<Sight> sights;
     for (std::int64_t i = 0; i < n; ++i) {
         if (!views[i]) return tl::unexpected(views[i].error().at(fmt::format("view {}", i)));
-        if (views[i]->pointCount() == 0) {
-            noteBlind(static_cast<std::size_t>(i), job);
-            continue;
-        }
-        bundle.views.push_back(std::move(*views[i]));
+        sights.push_back(sightOf(mesh, *views[i]));
+        if (sights.back() == Sight::points) bundle.views.push_back(std::move(*views[i]));
     }
-    if (bundle.views.empty()) return tl::unexpected(blindError(cameras));
+    noteBlind(sights, job);
+    if (bundle.views.empty()) return tl::unexpected(blindError(cameras, sights));
     faint.note(job);
     bundle.origin = mesh.origin;
     bundle.bounds = subject.bounds;
@@ -360,10 +386,12 @@ Result<void> withCapturedViews(
     STX_TRY(const auto subject, subjectOf(whole, cameras, settings, job));
     const Mesh& mesh = subject.withoutStrays ? *subject.withoutStrays : whole;
     noteMaterials(mesh, subject.kinds, settings, job);
-    std::vector<std::size_t> numbers(cameras.size());
-    std::iota(numbers.begin(), numbers.end(), std::size_t{0});
+    std::vector<Sight> sights(cameras.size(), Sight::points);
     for (;;) {
-        if (numbers.empty()) return tl::unexpected(blindError(cameras));
+        std::vector<std::size_t> numbers;
+        for (std::size_t i = 0; i < sights.size(); ++i)
+            if (sights[i] == Sight::points) numbers.push_back(i);
+        if (numbers.empty()) return tl::unexpected(blindError(cameras, sights));
         Bundle headers;
         headers.origin = mesh.origin;
         headers.bounds = subject.bounds;
@@ -391,9 +419,8 @@ Result<void> withCapturedViews(
         STX_CHECK(job.checkCancelled());
         Job quiet;
         quiet.workFor(job);
-        STX_TRY(numbers, seeing(mesh, cameras, settings, quiet));
-        for (std::size_t i = 0; i < cameras.size(); ++i)
-            if (!std::ranges::binary_search(numbers, i)) noteBlind(i, job);
+        STX_TRY(sights, sightsOf(mesh, cameras, settings, quiet));
+        noteBlind(sights, job);
     }
 }
 

@@ -13,13 +13,15 @@ namespace {
 /// large.
 constexpr float kLargest = 1e15f;
 
-/// Opacity from which a splat counts for what a cloud reaches: alone it gives pictures depth.
-constexpr double kSeen = 0.5;
-/// And the alpha to which it counts. Where pictures have depth, an alpha of one half, is further
-/// out than where one splat alone has that: of seven clouds of 9 to 1000 splats framed so 0.5 to 7
-/// % of the side are cut off, with 0.25 0.5 % of one cloud, with 0.15 nothing, but nearly twice as
-/// much stays free around the others (by the centres alone 4 to 28 % are cut off).
+/// The alpha to which a splat counts for what a cloud reaches. Where pictures have depth, an alpha
+/// of one half, is further out than where one splat alone has that: of seven clouds of 9 to 1000
+/// splats framed so 0.5 to 7 % of the side are cut off, with 0.25 0.5 % of one cloud, with 0.15
+/// nothing, but nearly twice as much stays free around the others (by the centres alone 4 to 28 %
+/// are cut off).
 constexpr double kEdge = 0.25;
+/// Or, if that is more, this share of its opacity: the same for one of an opacity of one half, from
+/// which on it gives pictures depth alone.
+constexpr double kEdgeOfFaint = 0.5;
 
 bool finite(glm::vec3 v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -39,9 +41,8 @@ double SplatCloud::mostReach(std::size_t i) const {
 }
 
 glm::dmat3 SplatCloud::reach(std::size_t i) const {
-    const double opacity = opacities[i];
-    if (!(opacity > kSeen)) return glm::dmat3(0.0);
-    const double deviations = std::sqrt(2.0 * std::log(opacity / kEdge));
+    const double deviations =
+        std::sqrt(2.0 * std::log(std::max(opacities[i] / kEdge, 1.0 / kEdgeOfFaint)));
     const glm::dvec4 q(rotations[i]);
     glm::dmat3 axes = glm::mat3_cast(glm::dquat(q.w, q.x, q.y, q.z));
     for (int k = 0; k < 3; ++k) axes[k] *= static_cast<double>(scales[i][k]);
@@ -65,25 +66,31 @@ Result<void> SplatCloud::resize(std::size_t count, int degreeToHold, const Limit
     return {};
 }
 
+bool SplatCloud::isSound(std::size_t i) const {
+    const glm::vec3 size = scales[i];
+    const double length = glm::length(glm::dvec4(rotations[i]));
+    if (!finite(positions[i]) || !finite(size) || !finite(colours[i]) ||
+        !glm::all(glm::greaterThanEqual(size, glm::vec3(0.0f))) ||
+        !glm::all(glm::lessThanEqual(size, glm::vec3(kLargest))) || !std::isfinite(length) ||
+        !(length > 1e-12) || !(opacities[i] >= 0.0f))
+        return false;
+    // Half floats that are infinite or no number have all bits of their exponent.
+    const auto own = static_cast<std::size_t>(paddedCount(degree)) * 3;
+    return std::all_of(harmonics.begin() + static_cast<std::ptrdiff_t>(i * own),
+                       harmonics.begin() + static_cast<std::ptrdiff_t>((i + 1) * own),
+                       [](std::uint16_t h) { return (h & 0x7c00) != 0x7c00; });
+}
+
 Result<void> SplatCloud::dropBroken(Job& job) {
     const std::size_t count = positions.size();
     const auto padded = static_cast<std::size_t>(paddedCount(degree)) * 3;
     std::size_t kept = 0;
     for (std::size_t i = 0; i < count; ++i) {
-        const glm::vec3 size = scales[i];
-        const glm::dvec4 turn(rotations[i]);
-        const double length = std::sqrt(glm::dot(turn, turn));
-        bool sound = finite(positions[i]) && finite(size) && finite(colours[i]) &&
-                     glm::all(glm::greaterThanEqual(size, glm::vec3(0.0f))) &&
-                     glm::all(glm::lessThanEqual(size, glm::vec3(kLargest))) &&
-                     std::isfinite(length) && length > 1e-12 && opacities[i] >= 0.0f;
-        // Half floats that are infinite or no number have all bits of their exponent.
-        for (std::size_t h = i * padded; sound && h < (i + 1) * padded; ++h)
-            sound = (harmonics[h] & 0x7c00) != 0x7c00;
-        if (!sound) continue;
+        if (!isSound(i)) continue;
         positions[kept] = positions[i];
-        scales[kept] = size;
-        rotations[kept] = glm::vec4(turn / length);
+        scales[kept] = scales[i];
+        const glm::dvec4 turn(rotations[i]);
+        rotations[kept] = glm::vec4(turn / glm::length(turn));
         opacities[kept] = std::min(opacities[i], 1.0f);
         colours[kept] = colours[i];
         if (kept != i)

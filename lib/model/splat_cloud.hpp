@@ -38,8 +38,8 @@ struct SplatCloud {
     /// How far splat `i` reaches: column k leads from its centre to the place that is farthest
     /// along +k of those where it hides a quarter or more of what is behind it, scene units; where
     /// some overlap, that is half of it, and pictures have depth. So the box of these places has
-    /// half the size (x of column 0, y of 1, z of 2). Zeros for a splat of an opacity of one half
-    /// or less: it may be as large as it likes.
+    /// half the size (x of column 0, y of 1, z of 2). Of a splat of an opacity below one half it is
+    /// where it hides half as much as at its centre.
     [[nodiscard]] glm::dmat3 reach(std::size_t i) const;
     /// What it reaches at most in any direction, if it were opaque: quick to tell.
     [[nodiscard]] double mostReach(std::size_t i) const;
@@ -51,9 +51,11 @@ struct SplatCloud {
     /// Makes room for `count` splats of `degree`. Errors (invalidInput): over the memory limit.
     [[nodiscard]] Result<void> resize(std::size_t count, int degreeToHold, const Limits& limits);
 
-    /// Takes out splats that no picture can show: values that are not finite, sizes below 0 or
-    /// above 1e15, rotations of no length, opacities below 0; those above 1 become 1, and rotations
-    /// unit. How many went is said with a note. Errors (invalidInput): none is left.
+    /// Whether a picture can show splat `i`: values are finite, sizes 0..1e15, the rotation has a
+    /// length, the opacity is not below 0.
+    [[nodiscard]] bool isSound(std::size_t i) const;
+    /// Takes out splats that are not sound; opacities above 1 become 1, and rotations unit. How
+    /// many went is said with a note. Errors (invalidInput): none is left.
     [[nodiscard]] Result<void> dropBroken(Job& job);
 
     bool operator==(const SplatCloud&) const = default;

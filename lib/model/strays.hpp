@@ -29,8 +29,8 @@ struct Strays {
 [[nodiscard]] Strays findStrays(std::uint64_t count,
                                 const std::function<Piece(std::uint64_t)>& piece);
 
-/// The same of a mesh: its triangles, then its points. Bounds of splats hold what hides half of
-/// what is behind it (SplatCloud::reach()).
+/// The same of a mesh: its triangles, then its points. Bounds of splats hold what
+/// SplatCloud::reach() says.
 [[nodiscard]] Strays findStrays(const Mesh& mesh);
 
 /// "2 of 60000 points lie far outside of the rest, the farthest at 1000000 0 0: …"; `shift` is

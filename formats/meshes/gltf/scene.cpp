@@ -51,7 +51,7 @@ class SceneReader {
     Result<Mesh> read() {
         STX_CHECK(readNodes());
         STX_CHECK(readScene());
-        if (splats_.positions.empty()) {
+        if (splats_.centres.empty()) {
             say();
             return builder_.finish();
         }
@@ -424,9 +424,12 @@ class SceneReader {
             if (!(*list)[p].is_object()) continue;  // said by those who read the others
             STX_TRY(const Json* splats, splatsIn((*list)[p], at));
             for (std::size_t i = 0; splats && i < transforms.size(); ++i) {
-                const std::size_t first = splats_.positions.size();
+                const std::size_t first = splats_.centres.size();
                 STX_CHECK(addSplats(model_, (*list)[p], at, splats_));
-                transformSplats(splats_, first, transforms[i]);
+                for (std::size_t k = first; k < splats_.centres.size(); ++k)
+                    splats_.centres[k] =
+                        glm::dvec3(transforms[i] * glm::dvec4(splats_.centres[k], 1.0));
+                transformSplats(splats_.cloud, first, transforms[i]);
             }
         }
         return {};
@@ -449,7 +452,7 @@ class SceneReader {
     std::vector<Node> nodes_;
     std::map<std::uint64_t, std::vector<Primitive>> meshes_;
     std::map<std::string, int> dropped_;
-    SplatCloud splats_;
+    FileSplats splats_;
 };
 
 }  // namespace

@@ -13,19 +13,51 @@ constexpr const char* kNeeded[] = {"x",       "y",       "z",      "opacity", "s
                                    "scale_1", "scale_2", "rot_0",  "rot_1",   "rot_2",
                                    "rot_3",   "f_dc_0",  "f_dc_1", "f_dc_2"};
 
+/// Begins the names of harmonics; a number from 0 on follows.
+constexpr std::string_view kRest = "f_rest_";
+
 const PlyElement* verticesOf(const PlyHeader& header) {
     for (const PlyElement& element : header.elements)
         if (element.name == "vertex") return &element;
     return nullptr;
 }
 
+bool hasNumber(const PlyElement& element, std::string_view name) {
+    return std::ranges::any_of(element.properties,
+                               [&](const PlyProperty& p) { return p.name == name && !p.isList; });
+}
+
+using Places = std::map<std::string, std::size_t, std::less<>>;
+
+/// The places of the harmonics among the properties, by their numbers.
+Result<std::vector<std::size_t>> placesOfRest(const Places& places) {
+    const auto count = static_cast<std::size_t>(std::ranges::count_if(
+        places, [](const auto& place) { return place.first.starts_with(kRest); }));
+    if (count != 0 && count != 9 && count != 24 && count != 45)
+        return fail(ErrorCode::invalidInput,
+                    "the splats have {} values f_rest_*; 0, 9, 24 or 45 are expected (degree 0 to "
+                    "3)",
+                    count);
+    std::vector<std::size_t> out;
+    for (std::size_t k = 0; k < count; ++k) {
+        const auto place = places.find(fmt::format("{}{}", kRest, k));
+        if (place == places.end())
+            return fail(ErrorCode::invalidInput,
+                        "the splats have {} values f_rest_*, but no f_rest_{}; f_rest_0 to "
+                        "f_rest_{} are expected",
+                        count, k, count - 1);
+        out.push_back(place->second);
+    }
+    return out;
+}
+
 /// Says what the file holds beside splats. Their normals mean nothing: INRIA's program writes
 /// zeros.
-void noteDropped(const PlyHeader& header, int rest, Job& job) {
+void noteDropped(const PlyHeader& header, Job& job) {
     const auto names = unusedProperties(*verticesOf(header), [&](const PlyProperty& p) {
         const std::string_view n = p.name;
         return std::ranges::find(kNeeded, n) != std::end(kNeeded) || n == "nx" || n == "ny" ||
-               n == "nz" || (n.starts_with("f_rest_") && rest > 0);
+               n == "nz" || n.starts_with(kRest);
     });
     if (!names.empty()) job.note(fmt::format("dropped: PLY properties of vertices ({})", names));
     for (const PlyElement& element : header.elements)
@@ -37,12 +69,14 @@ void noteDropped(const PlyHeader& header, int rest, Job& job) {
 
 bool isSplatPly(const PlyHeader& header) {
     const PlyElement* vertices = verticesOf(header);
-    if (!vertices) return false;
-    return std::ranges::all_of(kNeeded, [&](std::string_view name) {
-        return std::ranges::any_of(vertices->properties, [&](const PlyProperty& p) {
-            return p.name == name && !p.isList;
-        });
-    });
+    return vertices && std::ranges::all_of(kNeeded, [&](std::string_view name) {
+               return hasNumber(*vertices, name);
+           });
+}
+
+bool isPackedSplatPly(const PlyHeader& header) {
+    const PlyElement* vertices = verticesOf(header);
+    return vertices && hasNumber(*vertices, "packed_position");
 }
 
 Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job) {
@@ -51,7 +85,7 @@ Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job) {
         return fail(ErrorCode::unsupported,
                     "element '{}' comes before the vertices; splats are expected first",
                     header.elements.front().name);
-    std::map<std::string, std::size_t, std::less<>> places;
+    Places places;
     std::size_t stride = 0;
     for (const PlyProperty& p : vertices.properties) {
         if (p.isList)
@@ -60,30 +94,22 @@ Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job) {
         places.emplace(p.name, static_cast<std::size_t>(&p - vertices.properties.data()));
         stride += plySize(p.type);
     }
-    int rest = 0;
-    while (places.contains(fmt::format("f_rest_{}", rest))) ++rest;
+    STX_TRY(const std::vector<std::size_t> atRest, placesOfRest(places));
     int degree = 0;
-    while (degree < 3 && 3 * SplatCloud::coefficientCount(degree) < rest) ++degree;
-    if (3 * SplatCloud::coefficientCount(degree) != rest)
-        return fail(ErrorCode::invalidInput,
-                    "the splats have {} values f_rest_*; 0, 9, 24 or 45 are expected (degree 0 to "
-                    "3)",
-                    rest);
+    while (3 * SplatCloud::coefficientCount(degree) < std::ssize(atRest)) ++degree;
     const auto count = static_cast<std::size_t>(vertices.count);
     const std::size_t left = bytes.size() - header.dataOffset;
     if (header.coding != PlyCoding::ascii && count > left / stride)
         return fail(ErrorCode::invalidInput,
                     "the header says {} splats of {} bytes, but only {} bytes follow", count,
                     stride, left);
-    SplatCloud cloud;
-    STX_CHECK(cloud.resize(count, degree, job.limits));
+    FileSplats splats;
+    STX_CHECK(splats.resize(count, degree, job.limits));
+    SplatCloud& cloud = splats.cloud;
     cloud.up = {0, -1, 0};
-    std::vector<std::size_t> at, atRest;
+    std::vector<std::size_t> at;
     at.reserve(std::size(kNeeded));
-    atRest.reserve(static_cast<std::size_t>(rest));
     for (const char* name : kNeeded) at.push_back(places.find(name)->second);
-    for (int k = 0; k < rest; ++k)
-        atRest.push_back(places.find(fmt::format("f_rest_{}", k))->second);
     const int coefficients = SplatCloud::coefficientCount(degree);
     PlyValues values(bytes, header.dataOffset, header.coding);
     std::vector<double> splat(vertices.properties.size());
@@ -101,19 +127,19 @@ Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job) {
         const auto number = [&](std::size_t k) { return splat[at[k]]; };
         for (int k = 0; k < 3; ++k) {
             const auto part = static_cast<std::size_t>(k);
-            cloud.positions[i][k] = static_cast<float>(number(part));
+            splats.centres[i][k] = number(part);
             cloud.scales[i][k] = static_cast<float>(std::exp(number(4 + part)));
             cloud.colours[i][k] = static_cast<float>(0.5 + kDegree0 * number(11 + part));
         }
         cloud.opacities[i] = static_cast<float>(1.0 / (1.0 + std::exp(-number(3))));
         // w comes first.
         cloud.rotations[i] = glm::vec4(number(8), number(9), number(10), number(7));
-        for (int k = 0; k < rest; ++k)
+        for (int k = 0; k < std::ssize(atRest); ++k)
             cloud.setHarmonic(i, k % coefficients, k / coefficients,
                               static_cast<float>(splat[atRest[k]]));
     }
-    noteDropped(header, rest, job);
-    return meshOfSplats(std::move(cloud), job);
+    noteDropped(header, job);
+    return meshOfSplats(std::move(splats), job);
 }
 
 }  // namespace stx

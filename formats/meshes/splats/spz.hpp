@@ -13,6 +13,8 @@ inline constexpr std::uint32_t kMagic = 0x5053474e;  // "NGSP"
 inline constexpr std::size_t kHeaderBytes = 16;
 /// Of version 4; and of an entry of its table, the sizes of a stream packed and unpacked.
 inline constexpr std::size_t kLongHeaderBytes = 32, kEntryBytes = 16;
+/// Flags of the header.
+inline constexpr std::uint32_t kAntialiased = 1, kExtensions = 2;
 inline constexpr int kFixedBits = 24;  ///< of a coordinate, with its sign
 /// Bytes that one byte of zstd holds at most: a block of 128 KiB takes four.
 inline constexpr std::uint64_t kMostOfZstd = 32768;

@@ -49,7 +49,7 @@ glm::vec4 firstThree(const std::byte* from) {
 
 /// What a header says, and where each attribute of all splats begins in `bytes`.
 struct Content {
-    std::uint32_t version = 0;
+    std::uint32_t version = 0, flags = 0;
     std::size_t count = 0;
     int degree = 0, fractionalBits = 0;
     std::size_t rotationBytes = 4, harmonicBytes = 0;  ///< of a splat
@@ -70,6 +70,7 @@ Result<Content> readHeader(ByteSpan bytes, std::uint32_t least, std::uint32_t mo
     out.count = wordAt(bytes.data() + 8, 4);
     out.degree = std::to_integer<int>(bytes[12]);
     out.fractionalBits = std::to_integer<int>(bytes[13]);
+    out.flags = wordAt(bytes.data() + 14, 1);
     if (out.degree > 3)
         return fail(ErrorCode::unsupported, "the splats have harmonics of degree {}; 3 is the most",
                     out.degree);
@@ -150,13 +151,25 @@ Result<Content> unpackSpz(ByteSpan file, const Limits& limits) {
                 "'NGSP', as version 4 does");
 }
 
+void noteFlags(std::uint32_t flags, Job& job) {
+    if (flags & spz::kAntialiased)
+        job.note(
+            "the SPZ header asks for antialiased drawing, which makes splats below a pixel "
+            "fainter; they are drawn without it and may look too large");
+    if (flags & spz::kExtensions) job.note("dropped: the extensions of the SPZ file");
+    if (const std::uint32_t others = flags & ~(spz::kAntialiased | spz::kExtensions))
+        job.note(fmt::format("flags of the SPZ header that are not known here are ignored: {:#04x}",
+                             others));
+}
+
 }  // namespace
 
 Result<Mesh> readSpz(ByteSpan file, Job& job) {
     STX_TRY(Content content, unpackSpz(file, job.limits));
     const std::size_t count = content.count;
-    SplatCloud cloud;
-    STX_CHECK(cloud.resize(count, content.degree, job.limits));
+    FileSplats splats;
+    STX_CHECK(splats.resize(count, content.degree, job.limits));
+    SplatCloud& cloud = splats.cloud;
     const std::byte* const positions = content.bytes.data() + content.begin;
     const std::byte* const alphas = positions + 9 * count;
     const std::byte* const colours = alphas + count;
@@ -169,7 +182,7 @@ Result<Mesh> readSpz(ByteSpan file, Job& job) {
             const std::size_t at = 3 * i + static_cast<std::size_t>(k);
             // The sign is the highest of the 24 bits.
             const auto fixed = static_cast<std::int32_t>(wordAt(positions + 3 * at, 3) << 8) >> 8;
-            cloud.positions[i][k] = static_cast<float>(fixed * step);
+            splats.centres[i][k] = fixed * step;
             cloud.scales[i][k] = std::exp(byteAt(scales, at) / 16.0f - 10.0f);
             const float f = (byteAt(colours, at) / 255.0f - 0.5f) / spz::kColourScale;
             cloud.colours[i][k] = 0.5f + static_cast<float>(spz::kDegree0) * f;
@@ -183,7 +196,8 @@ Result<Mesh> readSpz(ByteSpan file, Job& job) {
                               (byteAt(harmonics, i * all + k) - 128.0f) / 128.0f);
     }
     content.bytes = {};
-    return meshOfSplats(std::move(cloud), job);
+    noteFlags(content.flags, job);
+    return meshOfSplats(std::move(splats), job);
 }
 
 }  // namespace stx

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -310,6 +311,77 @@ TEST(Splats, WhatAPlyHasBesideSplatsIsSaidToBeDropped) {
     EXPECT_EQ(model.notes,
               (std::vector<std::string>{"dropped: PLY properties of vertices (filter_3D)",
                                         "dropped: PLY elements 'face' (1)"}));
+}
+
+/// A PLY file of splats, as text, of which each line has x, the logit of the opacity and w.
+std::string textOfSplats(const std::string& lines) {
+    std::string text = "ply\nformat ascii 1.0\nelement vertex ";
+    text += std::to_string(std::ranges::count(lines, '\n')) + "\n";
+    for (const char* name : {"x", "opacity", "rot_0", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2",
+                             "scale_0", "scale_1", "scale_2", "rot_1", "rot_2", "rot_3"})
+        text += fmt::format("property double {}\n", name);
+    text += "end_header\n";
+    for (const char c : lines)
+        text += c == '\n' ? " 0.25 0.25 1 1 1 -3 -3 -3 0 0 0\n" : std::string(1, c);
+    return text;
+}
+
+TEST(Splats, FarFromZeroTheyCountFromAnOrigin) {
+    // The broken one and the one that is hardly seen tell nothing of the origin.
+    const auto model = readGoodText(
+        textOfSplats("5000000.125 3 1\n9 3 0\n4999999.75 3 1\n-7000000 -4 1\n"), "a.ply");
+    EXPECT_EQ(model.mesh.origin, glm::dvec3(5000000, 0, 0));
+    EXPECT_TRUE(model.hasNote("1 of 4 splats left out"));
+    EXPECT_TRUE(model.hasNote("the origin 5000000 0 0 is subtracted"));
+    ASSERT_EQ(model.mesh.positions.size(), 3u);
+    EXPECT_EQ(model.mesh.positions[0], glm::vec3(0.125f, 0.25f, 0.25f));
+    EXPECT_EQ(model.mesh.positions[1], glm::vec3(-0.25f, 0.25f, 0.25f));
+    EXPECT_EQ(model.mesh.positions[2], glm::vec3(-12000000, 0.25f, 0.25f));
+    EXPECT_EQ(model.mesh.splats->positions, model.mesh.positions);
+    // A single one, too: its size tells what floats lose.
+    EXPECT_EQ(readGoodText(textOfSplats("5000000.125 3 1\n"), "a.ply").mesh.positions[0].x, 0.125f);
+    // Exact in floats, and near enough to 0.
+    EXPECT_EQ(readGoodText(textOfSplats("0.125 3 1\n"), "a.ply").mesh.origin, glm::dvec3(0.0));
+}
+
+TEST(Splats, ThoseThatHideMostFrameACloud) {
+    const auto framing = [](const std::string& lines) {
+        return readGoodText(textOfSplats(lines), "a.ply").mesh.points;
+    };
+    using Points = std::vector<std::uint32_t>;
+    EXPECT_EQ(framing("0 3 1\n1 -0.2 1\n2 0.1 1\n"), (Points{0, 2}));
+    // Opacities of 0.45, 0.02 and 0.27.
+    EXPECT_EQ(framing("0 -0.2 1\n1 -4 1\n2 -1 1\n"), (Points{0, 2}));
+}
+
+TEST(Splats, WhatPlayCanvasPacksIsNotRead) {
+    const Error error = readBadText(
+        "ply\nformat ascii 1.0\nelement chunk 1\nproperty float min_x\nelement vertex 1\n"
+        "property uint packed_position\nend_header\n0\n0\n",
+        "a.ply");
+    EXPECT_EQ(error.code, ErrorCode::unsupported);
+    EXPECT_NE(error.message.find("splat-transform"), std::string::npos);
+}
+
+TEST(Splats, HarmonicsOfPlyHaveNoGap) {
+    std::string rest = restOf(9);
+    rest.replace(rest.find("f_rest_3"), 8, "f_rest_9");
+    EXPECT_NE(readBadText(splatPly(rest, 1, 26), "a.ply").message.find("no f_rest_3"),
+              std::string::npos);
+}
+
+TEST(Splats, FlagsOfSpzAreSaid) {
+    const auto notesOf = [](char flags) {
+        std::string content = contentOfSpz();
+        content[14] = flags;
+        const auto packed = compressGzip(std::as_bytes(std::span(content)), 6);
+        return readGoodText({reinterpret_cast<const char*>(packed.data()), packed.size()}, "a.spz")
+            .notes;
+    };
+    EXPECT_EQ(notesOf(0), std::vector<std::string>());
+    EXPECT_NE(notesOf(1).at(0).find("antialiased"), std::string::npos);
+    EXPECT_NE(notesOf(2).at(0).find("extensions"), std::string::npos);
+    EXPECT_NE(notesOf(-128).at(0).find("ignored: 0x80"), std::string::npos);
 }
 
 TEST(Splats, HostilePlyIsAnErrorOrLeftOut) {

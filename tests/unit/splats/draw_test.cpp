@@ -287,30 +287,54 @@ TEST(CaptureOfSplats, SaysWhatIsTooFaintForDepth) {
 }
 
 TEST(CaptureOfSplats, FramesWhatHidesHalfOfWhatIsBehind) {
-    // A rod of one splat, turned by 30 degrees about z, and a huge one that is hardly seen. Where
-    // splats overlap, a quarter of each is half.
-    SplatCloud cloud;
-    ASSERT_TRUE(cloud.resize(2, 0, Limits()));
-    cloud.rotations[0] = glm::vec4(0, 0, std::sin(M_PI / 12), std::cos(M_PI / 12));
-    cloud.rotations[1] = glm::vec4(0, 0, 0, 1);
-    cloud.scales = {{1.0f, 0.1f, 0.05f}, {50, 50, 50}};
-    cloud.opacities = {0.98f, 0.3f};
+    // A rod of one splat, turned by 30 degrees about z, and a huge one that frames nothing. Where
+    // splats overlap, a quarter of each is half; of a faint one half of what it hides is looked at.
+    for (const auto& [opacity, share] : {std::pair{0.98f, 0.98 / 0.25}, {0.5f, 2.0}, {0.3f, 2.0}}) {
+        SplatCloud cloud;
+        ASSERT_TRUE(cloud.resize(2, 0, Limits()));
+        cloud.rotations[0] = glm::vec4(0, 0, std::sin(M_PI / 12), std::cos(M_PI / 12));
+        cloud.rotations[1] = glm::vec4(0, 0, 0, 1);
+        cloud.scales = {{1.0f, 0.1f, 0.05f}, {50, 50, 50}};
+        cloud.opacities = {opacity, 0.1f};
+        Mesh mesh;
+        mesh.positions = cloud.positions;
+        mesh.points = {0};
+        mesh.splats = std::make_shared<const SplatCloud>(cloud);
+        const double reach = std::sqrt(2 * std::log(share));
+        const double x = reach * std::hypot(std::cos(M_PI / 6), 0.1 * std::sin(M_PI / 6)),
+                     y = reach * std::hypot(std::sin(M_PI / 6), 0.1 * std::cos(M_PI / 6));
+        const Bounds bounds = mesh.bounds();
+        EXPECT_NEAR(bounds.max.x, x, 1e-5);
+        EXPECT_NEAR(bounds.min.y, -y, 1e-5);
+        EXPECT_NEAR(bounds.max.z, 0.05 * reach, 1e-5);
+        Bounds framed;
+        for (const glm::vec3 p : drawnPoints(mesh)) framed.add(p);
+        EXPECT_NEAR(framed.max.x, x, 1e-5);
+        EXPECT_NEAR(framed.min.y, -y, 1e-5);
+        EXPECT_NEAR(framed.max.z, 0.05 * reach, 1e-5);
+    }
+}
+
+TEST(CaptureOfSplats, SaysThatTheyAreTooFaintForViews) {
     Mesh mesh;
+    auto cloud = disc({0, 0, 1});
+    cloud.opacities[0] = 0.45f;
     mesh.positions = cloud.positions;
-    mesh.points = {0, 1};
+    mesh.points = {0};
     mesh.splats = std::make_shared<const SplatCloud>(cloud);
-    const double reach = std::sqrt(2 * std::log(0.98 / 0.25));
-    const double x = reach * std::hypot(std::cos(M_PI / 6), 0.1 * std::sin(M_PI / 6)),
-                 y = reach * std::hypot(std::sin(M_PI / 6), 0.1 * std::cos(M_PI / 6));
-    const Bounds bounds = mesh.bounds();
-    EXPECT_NEAR(bounds.max.x, x, 1e-5);
-    EXPECT_NEAR(bounds.min.y, -y, 1e-5);
-    EXPECT_NEAR(bounds.max.z, 0.05 * reach, 1e-5);
-    Bounds framed;
-    for (const glm::vec3 p : drawnPoints(mesh)) framed.add(p);
-    EXPECT_NEAR(framed.max.x, x, 1e-5);
-    EXPECT_NEAR(framed.min.y, -y, 1e-5);
-    EXPECT_NEAR(framed.max.z, 0.05 * reach, 1e-5);
+    Camera away = cameraFrom({0, 0, 3}, 21, 21);
+    away.position.z = -3;
+    const std::vector<Camera> cameras = {cameraFrom({0, 0, 3}, 21, 21), away};
+    for (const bool one : {true, false}) {
+        Job job;
+        const auto bundle =
+            one ? captureBundle(mesh, cameras, {}, job) : captureBundle(mesh, {away}, {}, job);
+        ASSERT_FALSE(bundle);
+        EXPECT_EQ(bundle.error().message.find("so that no view has depth") != std::string::npos,
+                  one);
+        EXPECT_EQ(job.takeNotes().back(),
+                  fmt::format("view {} sees nothing of the model and was left out", one ? 1 : 0));
+    }
 }
 
 TEST(DrawSplats, HugeSplatsStayWithinTheMemoryLimit) {
