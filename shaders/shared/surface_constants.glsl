@@ -18,6 +18,9 @@ CONSTANT float kCrack = 0.004f;
 // each is drawn larger by this to either side, pixels of the source. It is less than the parallax by which
 // a plane may be off (kPlanarPixels, 0.08).
 CONSTANT float kLeafGrow = 0.06f;
+// What reaches behind the camera is cut at this share of the distance of its farthest corner. Sums of floats of
+// what is cut nearer are off: at 1/10000 a percent of a picture of 165 degrees has a wrong depth, at 1/64 none.
+CONSTANT float kNearestShare = 0.015625f;
 // An extension is a square around a pixel at an edge, which the source's mesh of pixel centres covers by half
 // only. Half its side, pixels: that half pixel at edges inside of the object; beside background a little more,
 // since alpha ends the surface there.

@@ -7,13 +7,6 @@
 //                                drawn only there
 //   void raise(x, y, value)      makes a sample at least as near as `value`, bits of q and flags
 
-// Sample position, q and, in w, 1 = in front of the camera.
-vec4 cornerAt(float x, float y, float q) {
-    vec4 h = toSamples(x, y, q);
-    float inverse = 1.0f / h.w;
-    return vec4(h.x * inverse, h.y * inverse, h.z * inverse, h.w > 0.0f ? 1.0f : 0.0f);
-}
-
 // Samples of the convex polygon with these edges (ex x + ey y + e0 >= 0), this plane of q and this
 // range, inside a box.
 void scan(vec4 ex, vec4 ey, vec4 e0, vec3 plane, float qMin, float qMax, vec2 low, vec2 high, uint flags) {
@@ -23,6 +16,9 @@ void scan(vec4 ex, vec4 ey, vec4 e0, vec3 plane, float qMin, float qMax, vec2 lo
     vec2 from = max(low, vec2(0.0f)), to = min(high, vec2(float(SIDE - 1)));
     if (!(from.x <= to.x && from.y <= to.y) || !(qMin > 0.0f) || !(qMax <= qLimit())) return;
     ivec2 first = ivec2(ceil(from)), last = ivec2(floor(to));
+    // All of the box is outside of one edge, as of most that reach far beyond the frame.
+    vec4 most = max(ex * float(first.x), ex * float(last.x)) + (max(ey * float(first.y), ey * float(last.y)) + e0);
+    if (min(min(most.x, most.y), min(most.z, most.w)) < 0.0f) return;
     for (int y = first.y; y <= last.y; ++y) {
         for (int x = first.x; x <= last.x; ++x) {
             vec4 e = ex * float(x) + (ey * float(y) + e0);
@@ -33,21 +29,53 @@ void scan(vec4 ex, vec4 ey, vec4 e0, vec3 plane, float qMin, float qMax, vec2 lo
     }
 }
 
-// Polygons that turn the right way; `grow` moves their edges out, in samples.
-void fillQuad(vec4 a, vec4 b, vec4 c, vec4 d, float grow, uint flags) {
-    if (a.w + b.w + c.w + d.w < 4.0f) return;
+// Polygons that turn the right way, whose corners are sample positions and q; `grow` moves their edges
+// out, in samples.
+void fillPolygon(vec3 a, vec3 b, vec3 c, vec3 d, float grow, uint flags) {
     // The diagonals span the plane; its z component is twice the signed area.
-    vec4 ac = c - a, bd = d - b;
+    vec3 ac = c - a, bd = d - b;
     float area = ac.x * bd.y - ac.y * bd.x;
     if (!(area > 0.0f)) return;
     float px = (ac.z * bd.y - ac.y * bd.z) / area, py = (ac.x * bd.z - ac.z * bd.x) / area;
-    vec4 middle = 0.25f * (a + b + c + d);
+    vec3 middle = 0.25f * (a + b + c + d);
     vec4 xs = vec4(a.x, b.x, c.x, d.x), ys = vec4(a.y, b.y, c.y, d.y);
     vec4 ex = ys - vec4(b.y, c.y, d.y, a.y), ey = vec4(b.x, c.x, d.x, a.x) - xs;
     vec4 e0 = grow * (abs(ex) + abs(ey)) - (ex * xs + ey * ys);
-    vec4 low = min(min(a, b), min(c, d)), high = max(max(a, b), max(c, d));
+    vec3 low = min(min(a, b), min(c, d)), high = max(max(a, b), max(c, d));
     scan(ex, ey, e0, vec3(px, py, middle.z - px * middle.x - py * middle.y), low.z, high.z,
          vec2(low) - grow, vec2(high) + grow, flags);
+}
+
+vec3 placed(vec4 corner) { return vec3(corner) * (1.0f / corner.w); }
+
+// The same from corners of toSamples(). What reaches behind the camera is cut: its corners in front and
+// places on its edges are drawn as triangles.
+void fillQuad(vec4 a, vec4 b, vec4 c, vec4 d, float grow, uint flags) {
+    float most = max(max(a.w, b.w), max(c.w, d.w));
+    if (min(min(a.w, b.w), min(c.w, d.w)) > 0.0f) {
+        fillPolygon(placed(a), placed(b), placed(c), placed(d), grow, flags);
+        return;
+    }
+    float cut = kNearestShare * most;
+    if (!(cut > 0.0f)) return;
+    vec3 first = vec3(0.0f), before = vec3(0.0f);
+    int count = 0;
+    vec4 from = a;
+    for (int i = 0; i < 4; ++i) {
+        vec4 to = i == 0 ? b : i == 1 ? c : i == 2 ? d : a;
+        for (int j = 0; j < 2; ++j) {
+            // A corner, then where the edge behind it is cut.
+            bool there = j == 0 ? from.w >= cut : (from.w >= cut) != (to.w >= cut);
+            if (!there) continue;
+            vec4 at = j == 0 ? from : from + (to - from) * ((from.w - cut) / (from.w - to.w));
+            vec3 corner = placed(at);
+            if (count == 0) first = corner;
+            if (count > 1) fillPolygon(first, before, corner, first, grow, flags);
+            before = corner;
+            ++count;
+        }
+        from = to;
+    }
 }
 
 // A quad whose last corner is its first again: that edge holds everywhere, the plane is the same.
@@ -76,8 +104,8 @@ void drawCell(uint shape, vec4 a, vec4 b, vec4 c, vec4 d, uint flags) {
 
 // Part of a plane: q at its upper left corner, the middle of a pixel, and its slopes per pixel.
 void drawLeaf(float x, float y, float size, float q0, float qx, float qy) {
-    fillQuad(cornerAt(x, y, q0), cornerAt(x + size, y, q0 + size * qx),
-             cornerAt(x + size, y + size, q0 + size * (qx + qy)), cornerAt(x, y + size, q0 + size * qy),
+    fillQuad(toSamples(x, y, q0), toSamples(x + size, y, q0 + size * qx),
+             toSamples(x + size, y + size, q0 + size * (qx + qy)), toSamples(x, y + size, q0 + size * qy),
              kLeafGrow * float(S), 0u);
 }
 
@@ -89,7 +117,7 @@ void drawExtension(float x, float y, float q, float gx, float gy, float scale, b
     bool covers = (besideBackground || rim) && (abs(gx) + abs(gy)) * side < kExtensionCovers * scale;
     float plus = clamp(gx * side + gy * side, -reach, reach);
     float minus = clamp(gx * side - gy * side, -reach, reach);
-    fillQuad(cornerAt(x - side, y - side, q - plus), cornerAt(x + side, y - side, q + minus),
-             cornerAt(x + side, y + side, q + plus), cornerAt(x - side, y + side, q - minus), kCrack,
+    fillQuad(toSamples(x - side, y - side, q - plus), toSamples(x + side, y - side, q + minus),
+             toSamples(x + side, y + side, q + plus), toSamples(x - side, y + side, q - minus), kCrack,
              kExtensionBit | kNearEdgeBit | (covers ? kCoversBit : 0u) | (rim ? kRimBit : 0u));
 }

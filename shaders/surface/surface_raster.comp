@@ -60,8 +60,8 @@ void main() {
         drawLeaf(x, y, 1.0, leaf.x + leaf.y * d.x + leaf.z * d.y, leaf.y, leaf.z);
         return;
     }
-    drawCell(shape, cornerAt(x, y, q), cornerAt(x + 1.0, y, qAt(s, place, 1, 0)),
-             cornerAt(x + 1.0, y + 1.0, qAt(s, place, 1, 1)), cornerAt(x, y + 1.0, qAt(s, place, 0, 1)),
+    drawCell(shape, toSamples(x, y, q), toSamples(x + 1.0, y, qAt(s, place, 1, 0)),
+             toSamples(x + 1.0, y + 1.0, qAt(s, place, 1, 1)), toSamples(x, y + 1.0, qAt(s, place, 0, 1)),
              (code & kCellNearEdge) != 0u ? kNearEdgeBit : 0u);
 #endif
 }

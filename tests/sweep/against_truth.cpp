@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -29,10 +30,10 @@ int pick(const Pictures& pictures, int salt, int below) {
     return random.whole(0, below - 1);
 }
 
-Outcome openWhereSeen(Pictures& pictures) {
+Outcome openWhereSeen(Pictures& pictures, std::span<const Drawn> ways) {
     Measure out;
-    for (std::size_t i = 0; i < kWays.size(); ++i) {
-        STX_TRY(const Frame* frame, pictures.of(kWays[i]));
+    for (std::size_t i = 0; i < ways.size(); ++i) {
+        STX_TRY(const Frame* frame, pictures.of(ways[i]));
         const auto open = pictures.openShare(*frame, 2);
         if (!open) return std::nullopt;
         out.found = std::max(out.found, *open);
@@ -41,34 +42,52 @@ Outcome openWhereSeen(Pictures& pictures) {
     return out;
 }
 
-// From amid a room that two places see all around: surfaces reach behind the camera.
-Outcome openInWidePictures(Pictures& pictures) {
-    Captured wide = pictures.captured();
-    if (wide.from.shape != SweepCase::room) return std::nullopt;
+Outcome openWhereSeen(Pictures& pictures) {
+    return openWhereSeen(pictures, kWays);
+}
+
+// A room that two places see all around, from amid it or beside a wall: surfaces reach behind the
+// camera.
+Outcome openInside(Pictures& pictures, glm::dvec3 eye, double degrees,
+                   std::span<const Drawn> ways) {
+    Captured inside = pictures.captured();
+    if (inside.from.shape != SweepCase::room) return std::nullopt;
     const auto turn = [&](int salt) {
         const auto angle = [&](int k) {
             return glm::radians(static_cast<double>(pick(pictures, salt + k, 360)));
         };
         return glm::dquat(glm::dvec3(angle(0), angle(1), angle(2)));
     };
-    wide.bundle.views.clear();
+    inside.bundle.views.clear();
     for (const double beside : {-0.3, 0.2}) {
         Camera pose;
         pose.position = {beside, 0.1, 0.6 - beside};
         pose.orientation = turn(beside < 0 ? 353 : 359);
-        for (const Camera& face : facesAround(pose, std::clamp(wide.from.width, 24, 96) / 2)) {
-            wide.bundle.views.push_back(look(wide.scene, face));
-            wide.bundle.views.back().name = fmt::format("face{}", wide.bundle.views.size());
+        for (const Camera& face : facesAround(pose, std::clamp(inside.from.width, 24, 96) / 2)) {
+            inside.bundle.views.push_back(look(inside.scene, face));
+            inside.bundle.views.back().name = fmt::format("face{}", inside.bundle.views.size());
         }
     }
-    const double across = glm::radians(140.0 + pick(pictures, 349, 30));
-    wide.novel = Camera::fromFieldOfView({0, 0, 0.6}, turn(367), {across, across}, false, 96, 96);
-    wide.truth = look(wide.scene, wide.novel);
-    Pictures shown(wide);
-    auto open = openWhereSeen(shown);
+    const double across = glm::radians(degrees);
+    inside.novel = Camera::fromFieldOfView(eye, turn(367), {across, across}, false, 96, 96);
+    inside.truth = look(inside.scene, inside.novel);
+    Pictures shown(inside);
+    auto open = openWhereSeen(shown, ways);
     if (open && *open)
-        (*open)->what += fmt::format("; {:.0f} degrees across", glm::degrees(across));
+        (*open)->what += fmt::format("; {:.0f} degrees across at {:.2f} {:.2f} {:.2f}", degrees,
+                                     eye.x, eye.y, eye.z);
     return open;
+}
+
+Outcome openInWidePictures(Pictures& pictures) {
+    return openInside(pictures, {0, 0, 0.6}, 140 + pick(pictures, 349, 30), kWays);
+}
+
+Outcome openBesideWalls(Pictures& pictures) {
+    // In scene units; the room is six across, and texels are up to half a unit wide.
+    const double gap = 0.02 + 0.01 * pick(pictures, 373, 30);
+    return openInside(pictures, {3 - gap, 0, 0.6}, 60 + pick(pictures, 379, 80),
+                      std::span(kWays).first(2));
 }
 
 Outcome drawnWhereEmpty(Pictures& pictures) {

@@ -10,6 +10,7 @@ using Outcome = stx::Result<std::optional<Measure>>;
 // against_truth.cpp: one picture against the formulas, or two ways of drawing against each other.
 Outcome openWhereSeen(Pictures& pictures);
 Outcome openInWidePictures(Pictures& pictures);
+Outcome openBesideWalls(Pictures& pictures);
 Outcome drawnWhereEmpty(Pictures& pictures);
 Outcome filledWhereEmpty(Pictures& pictures);
 Outcome betterQualityCoversLess(Pictures& pictures);

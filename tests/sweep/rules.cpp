@@ -75,6 +75,8 @@ const std::vector<SweepRule>& rules() {
          0.3, measures::chosenViews},
         {"wide", "pictures from amid a room leave no place open that two views see", 0.5, "%",
          "as for open places", 0.5, measures::openInWidePictures},
+        {"beside-wall", "surfaces beside a wall are whole", 0.5, "%", "as for open places", 0.5,
+         measures::openBesideWalls},
     };
     return kRules;
 }

@@ -287,7 +287,7 @@ TEST(CpuSurface, WallsAreWholeHoweverWideThePicture) {
             }
         }
         EXPECT_EQ(open, 0) << degrees;
-        EXPECT_LT(off, 60) << degrees;
+        EXPECT_LT(off, 10) << degrees;
     }
 }
 

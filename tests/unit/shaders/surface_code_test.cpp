@@ -64,7 +64,7 @@ struct ScalarRaster {
         };
         forPixels(&SourceBlock::cells, [&](int x, int y) {
             const auto corner = [&](int i, int j) {
-                return cornerAt(x + i + 0.5f, y + j + 0.5f, s.q(x + i, y + j));
+                return toSamples(x + i + 0.5f, y + j + 0.5f, s.q(x + i, y + j));
             };
             BlockBuffer buffer;
             const auto texels = blockTexels(s, x / kBlock * kBlock, y / kBlock * kBlock, buffer);

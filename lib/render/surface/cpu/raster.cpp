@@ -40,24 +40,39 @@ struct Projection {
     }
 };
 
-HWY_NOINLINE void drawLeaves(Target& t, const Warp& warp, std::span<const Leaf> leaves, float grow,
-                             Extent& extent);
-
-/// Draws a leaf cell by cell. For one that reaches behind the camera, which as a whole has no place
-/// in the frame: its cells in front have.
-HWY_NOINLINE void drawCellsOf(const Leaf& leaf, Target& t, const Warp& warp, float grow,
-                              Extent& extent) {
-    std::array<Leaf, kBlock> row;
-    for (int j = 0; j < leaf.size; ++j) {
-        for (int i = 0; i < leaf.size; ++i)
-            row[static_cast<std::size_t>(i)] = {
-                static_cast<std::uint16_t>(leaf.x + i),
-                static_cast<std::uint16_t>(leaf.y + j),
-                1,
-                leaf.q0 + static_cast<float>(i) * leaf.qx + static_cast<float>(j) * leaf.qy,
-                leaf.qx,
-                leaf.qy};
-        drawLeaves(t, warp, std::span(row).first(leaf.size), grow, extent);
+/// Draws what is in front of the camera of a convex polygon of a source that reaches behind it, as
+/// shared/surface_raster.glsl does. `corners`: positions and q in the source.
+HWY_NOINLINE void drawInFront(Target& t, const Warp& warp, const std::array<glm::vec3, 4>& corners,
+                              float grow, std::uint32_t flags, Extent& extent) {
+    std::array<glm::vec4, 4> at;
+    float most = 0.0f;
+    for (std::size_t i = 0; i < 4; ++i) {
+        at[i] = warp.homogeneous(corners[i].x, corners[i].y, corners[i].z);
+        most = std::max(most, at[i].w);
+    }
+    const float cut = kNearestShare * most;
+    const auto placed = [](glm::vec4 corner) { return glm::vec3(corner) * (1.0f / corner.w); };
+    std::array<glm::vec3, 5> kept;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < 4 && cut > 0; ++i) {
+        const glm::vec4 &from = at[i], &to = at[(i + 1) % 4];
+        if (from.w >= cut) kept[count++] = placed(from);
+        if ((from.w >= cut) != (to.w >= cut))
+            kept[count++] = placed(from + (to - from) * ((from.w - cut) / (from.w - to.w)));
+    }
+    const FloatTag d;
+    Polygons p;
+    p.there = hn::FirstN(d, 1);
+    p.grow = hn::Set(d, grow);
+    p.flags = hn::Set(BitTag(), flags);
+    for (std::size_t k = 2; k < count; ++k) {
+        const std::array corner{kept[0], kept[k - 1], kept[k], kept[0]};
+        for (std::size_t c = 0; c < 4; ++c) {
+            p.x[c] = hn::Set(d, corner[c].x);
+            p.y[c] = hn::Set(d, corner[c].y);
+            p.q[c] = hn::Set(d, corner[c].z);
+        }
+        drawPolygons<false>(t, p, extent);
     }
 }
 
@@ -96,7 +111,11 @@ HWY_NOINLINE void drawLeaves(Target& t, const Warp& warp, std::span<const Leaf> 
         std::uint32_t behind = bitsOf(hn::AndNot(p.there, hn::FirstN(d, count)));
         for (; behind; behind &= behind - 1) {
             const Leaf& leaf = leaves[first + static_cast<std::size_t>(std::countr_zero(behind))];
-            if (leaf.size > 1) drawCellsOf(leaf, t, warp, grow, extent);
+            const glm::vec3 corner(leaf.x + 0.5f, leaf.y + 0.5f, leaf.q0);
+            const glm::vec3 across = glm::vec3(1, 0, leaf.qx) * static_cast<float>(leaf.size),
+                            down = glm::vec3(0, 1, leaf.qy) * static_cast<float>(leaf.size);
+            drawInFront(t, warp, {corner, corner + across, corner + across + down, corner + down},
+                        grow, 0, extent);
         }
     }
 }
@@ -144,9 +163,44 @@ struct CellRows {
         }
     }
 
+    /// Where the corners of a block begin in the source, and how they come from there.
+    struct Begin {
+        const Warp& warp;
+        float x, y;
+    };
+    /// Polygons of the cells below row j from column i on: the numbers of their corners (0 to 3 for
+    /// 00, 10, 11 and 01), and how they are drawn.
+    struct OfCells {
+        int j, i;
+        Floats number[4];
+        Floats grow;
+        Bits flags;
+    };
+    /// Draws those of `lanes`, which reach behind the camera.
+    HWY_NOINLINE void drawCut(Target& t, const Begin& begin, const OfCells& cells,
+                              std::uint32_t lanes, Extent& extent) const {
+        const FloatTag d;
+        alignas(64) float number[4][kLanes], grow[kLanes];
+        alignas(64) std::uint32_t flags[kLanes];
+        for (int c = 0; c < 4; ++c) hn::Store(cells.number[c], d, number[c]);
+        hn::Store(cells.grow, d, grow);
+        hn::Store(cells.flags, BitTag(), flags);
+        for (; lanes; lanes &= lanes - 1) {
+            const int l = std::countr_zero(lanes);
+            std::array<glm::vec3, 4> corners;
+            for (std::size_t c = 0; c < 4; ++c) {
+                const int k = static_cast<int>(number[c][l]);
+                const int column = cells.i + l + (k == 1 || k == 2), row = cells.j + (k >= 2);
+                corners[c] = {begin.x + static_cast<float>(column),
+                              begin.y + static_cast<float>(row), rows[row & 1].depth[column]};
+            }
+            drawInFront(t, begin.warp, corners, grow[l], flags[l], extent);
+        }
+    }
+
     /// Draws those of the cells below row j that `cells` has: cellShape() and cellNearEdge(), as
     /// many at once as a vector takes.
-    HWY_INLINE void draw(Target& t, const Source& s, int j, std::uint32_t cells,
+    HWY_INLINE void draw(Target& t, const Source& s, const Begin& begin, int j, std::uint32_t cells,
                          Extent& extent) const {
         const FloatTag d;
         const BitTag du;
@@ -219,16 +273,23 @@ struct CellRows {
             choose(x, p.x);
             choose(y, p.y);
             choose(q, p.q);
-            p.there = hn::And(wanted, hn::Or(hn::Or(quad, splits), hn::Or(upperLeft, upperRight)));
             Floats w[4];
             for (int c = 0; c < 4; ++c) w[c] = hn::LoadU(d, row[c]->w + column[c]);
-            const auto inFront = [&](Floats a, Floats b, Floats c, Floats e) HWY_ATTR {
-                return hn::Gt(hn::Min(hn::Min(a, b), hn::Min(c, e)), zero);
+            const Floats number[4] = {zero, hn::Set(d, 1.0f), hn::Set(d, 2.0f), hn::Set(d, 3.0f)};
+            // What is not in front as a whole is cut.
+            const auto drawThose = [&](FloatMask those, const auto& chosen) HWY_ATTR {
+                Floats of[4];
+                chosen(w, of);
+                p.there = hn::And(those, hn::Gt(leastOf(of), zero));
+                drawPolygons<false>(t, p, extent);
+                const std::uint32_t cut = bitsOf(hn::AndNot(p.there, those));
+                if (!cut) return;
+                OfCells polygons{j, i, {}, p.grow, p.flags};
+                chosen(number, polygons.number);
+                drawCut(t, begin, polygons, cut, extent);
             };
-            const FloatMask front = inFront(w[0], w[1], hn::IfThenElse(third, w[3], w[2]),
-                                            hn::IfThenElse(quad, w[3], w[0]));
-            p.there = hn::And(p.there, front);
-            drawPolygons<false>(t, p, extent);
+            drawThose(hn::And(wanted, hn::Or(hn::Or(quad, splits), hn::Or(upperLeft, upperRight))),
+                      choose);
             // 00, 11, 01 or 10, 11, 01.
             const FloatMask more = hn::And(wanted, hn::Or(splits, hn::Or(lowerRight, lowerLeft)));
             if (hn::AllFalse(d, more)) continue;
@@ -241,9 +302,7 @@ struct CellRows {
             chooseMore(x, p.x);
             chooseMore(y, p.y);
             chooseMore(q, p.q);
-            const Floats w0 = hn::IfThenElse(second, w[1], w[0]);
-            p.there = hn::And(more, inFront(w0, w[2], w[3], w0));
-            drawPolygons<false>(t, p, extent);
+            drawThose(more, chooseMore);
         }
     }
 };
@@ -255,14 +314,15 @@ HWY_NOINLINE void drawCells(Target& t, const Source& s, const Warp& warp, const 
                             const BlockTexels& texels, int x0, int y0, const BlockTexels& ahead,
                             Extent& extent) {
     CellRows grid;
+    const CellRows::Begin begin{warp, static_cast<float>(x0) + 0.5f, static_cast<float>(y0) + 0.5f};
     const int xEnd = std::min(x0 + kBlock, s.width - 1), yEnd = std::min(y0 + kBlock, s.height - 1);
     const int columns = xEnd - x0 + 1;
     int projected = -1;  // row
     const auto project = [&](int j) HWY_ATTR {
         if (projected >= j) return;
         projected = j;
-        grid.project(warp, j, static_cast<float>(x0) + 0.5f, static_cast<float>(y0 + j) + 0.5f,
-                     texels.q + texels.at(0, j), texels.info + texels.at(0, j), columns);
+        grid.project(warp, j, begin.x, begin.y + static_cast<float>(j), texels.q + texels.at(0, j),
+                     texels.info + texels.at(0, j), columns);
     };
     for (int j = 0; j <= yEnd - y0; ++j) {
         if (ahead.q) {
@@ -273,7 +333,7 @@ HWY_NOINLINE void drawCells(Target& t, const Source& s, const Warp& warp, const 
         if (j == kBlock || !block.cells[static_cast<std::size_t>(j)]) continue;
         project(j);
         project(j + 1);
-        grid.draw(t, s, j, block.cells[static_cast<std::size_t>(j)], extent);
+        grid.draw(t, s, begin, j, block.cells[static_cast<std::size_t>(j)], extent);
     }
 }
 

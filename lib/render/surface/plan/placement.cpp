@@ -14,8 +14,9 @@ namespace {
 constexpr float kBlockMargin = 1.05f, kBlockRounding = 1e-5f;
 /// What rounding may add to the terms that tell which way a block faces.
 constexpr double kFacingRounding = 1e-3;
-/// A block that is in part behind the camera is cut off at this share of its largest w.
-constexpr float kNearestShare = 1e-4f;
+/// A block that is in part behind the camera is cut off at this share of its largest w: far below
+/// where a part of it is (kNearestShare).
+constexpr float kNearestOfBlock = 1e-4f;
 
 /// Whether the frame's camera sees all that is drawn of a block from behind. `eye` is where that
 /// camera is, in the space of the source's pixels, homogeneous.
@@ -129,7 +130,7 @@ struct Placer {
         const auto [least, most] = std::ranges::minmax(corners.w);
         if (!(most > 0)) return std::nullopt;
         const bool behind = !(least > 0);
-        const auto box = behind ? corners.inFront(kNearestShare * most) : corners.all();
+        const auto box = behind ? corners.inFront(kNearestOfBlock * most) : corners.all();
         const float x0 = std::max(box.x0 - first.x - 0.5f, 0.0f);
         const float x1 = std::min(box.x1 - first.x + 0.5f, limit.x - 0.5f);
         const float y0 = std::max(box.y0 - first.y - 0.5f, 0.0f);
