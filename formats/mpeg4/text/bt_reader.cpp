@@ -122,6 +122,7 @@ Result<void> BtReader::readBlock() {
     if (in) STX_SET([[maybe_unused]] const auto stream, takeName("a stream's ES_ID"));
     const std::size_t before = commandsAt(document_.frames, time);
     rap_ = rap;
+    names_.goTo(time);
     STX_CHECK(readBlockCommands(time));
     rap_ = false;
     if (rap && commandsAt(document_.frames, time) > before)

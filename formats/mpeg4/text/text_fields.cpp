@@ -336,9 +336,9 @@ bool isPlainName(std::string_view name) {
 
 Result<void> NodeNames::define(const std::string& name, const NodePtr& node,
                                const std::string& where, bool again) {
-    const auto [entry, isNew] = byName_.try_emplace(name, Entry{node, where});
+    const auto [entry, isNew] = byName_.try_emplace(name, Entry{node, where, time_});
     if (!isNew && again) {
-        entry->second = Entry{node, where};
+        entry->second = Entry{node, where, time_};
     } else if (!isNew)
         return failAt(where, ErrorCode::invalidInput,
                       "DEF '{}' names a second node; the first stands at {}", excerpt(name),
@@ -458,6 +458,10 @@ Result<NodePtr> NodeNames::target(const std::string& name, const std::string& wh
     if (found == nullptr)
         return failAt(where, ErrorCode::invalidInput, "no node has the DEF name '{}'",
                       excerpt(name));
+    if (found->time > time_)
+        return failAt(where, ErrorCode::invalidInput,
+                      "this happens at tick {}, and DEF '{}' ({}) comes at {} only", time_,
+                      excerpt(name), found->where, found->time);
     return found->node;
 }
 

@@ -81,8 +81,11 @@ class NodeNames {
     [[nodiscard]] NodeNames ofBody() const {
         NodeNames names(*limits_);
         names.count_ = count_;
+        names.time_ = time_;
         return names;
     }
+    /// Says when what the text goes on with happens, ticks. Its times may go back.
+    void goTo(std::uint64_t time) { time_ = time; }
     /// Counts what a body named, too, once it has been read.
     void countOn(const NodeNames& body) { count_ = body.count_; }
 
@@ -107,7 +110,8 @@ class NodeNames {
     /// Remembers that `owner`'s field (item `item` of a list, or -1) waits for a name.
     void useLater(std::string name, NodePtr owner, int field, int item, std::string where);
 
-    /// The node of a name that a route or a command mentions. Errors when there is none.
+    /// The node of a name that a route or a command mentions. Errors when there is none at its
+    /// time.
     [[nodiscard]] Result<NodePtr> target(const std::string& name, const std::string& where) const;
 
     /// Fills in what useLater() remembered. Errors when a name never came, its node may not be
@@ -123,6 +127,7 @@ class NodeNames {
     struct Entry {
         NodePtr node;
         std::string where;
+        std::uint64_t time;
     };
     struct Pending {
         std::string name;
@@ -145,6 +150,7 @@ class NodeNames {
     std::vector<NodePtr> named_;
     std::unordered_map<const Node*, int> heights_;  ///< of DEF'd nodes; absent while open
     std::vector<Pending> pending_;
+    std::uint64_t time_ = 0;
     std::uint64_t count_ = 0;
     std::uint64_t nameCount_ = 0;  ///< DEF names that are not of the form N12
 };

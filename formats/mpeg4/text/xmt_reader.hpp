@@ -232,6 +232,7 @@ class XmtReader : private TextReader {
     }
 
     Result<void> readCommand(xml_node node, std::string_view type, std::uint64_t time) {
+        names_.goTo(time);
         const auto children = elements(node);
         if (!node.attribute("atRoute").empty()) return readRouteCommand(node, type, time);
         if (!children.empty() && localName(children[0]) == "Scene" && type == "Replace")

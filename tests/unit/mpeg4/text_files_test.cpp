@@ -220,6 +220,19 @@ TEST(Bt, ErrorsSayWhereWhatAndWhatWasExpected) {
               std::string::npos);
 }
 
+// Written in the order of time it would name what is not there yet.
+TEST(Bt, RefusesCommandsThatComeBeforeTheirNodes) {
+    const std::string scene = "AT 5 { REPLACE SCENE BY Group { children DEF A Transform { } } } ";
+    EXPECT_EQ(btErrorOf(scene + "AT 1 { REPLACE A.translation BY 1 2 3 }"),
+              "'test.bt':1:81: this happens at tick 1, and DEF 'A' ('test.bt':1:42) comes at 5 "
+              "only");
+    EXPECT_EQ(btErrorOf(scene + "AT 5 { REPLACE A.translation BY 1 2 3 }"), "no error");
+    EXPECT_EQ(btErrorOf("Group { children DEF A Transform { } } "
+                        "AT 5 { REPLACE A.translation BY 1 2 3 } "
+                        "AT 1 { REPLACE A.translation BY 3 2 1 }"),
+              "no error");
+}
+
 TEST(Bt, RefusesNodesThatHoldThemselvesOrNestTooDeeply) {
     EXPECT_NE(btErrorOf("DEF A Group { children [ USE A ] }").find("would hold itself"),
               std::string::npos);
