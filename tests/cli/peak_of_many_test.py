@@ -93,7 +93,8 @@ def many_views(args, folder):
 NOISY_LIMIT, SURFACES_LIMIT, PICTURES_LIMIT = 640, 140, 80
 # What is refined or refines first, and then looks at one view at a time.
 REFINED = {"refine exr": "refine {} -o OUT.exr", "refine mp4": "refine {} -o OUT.mp4 --without colours", "convert": "convert {} -o OUT.exr --refine noise",
-         "folder": "extract {} -o OUT --refine noise", "points": "extract {} -o OUT.ply --refine noise,agree"}
+           "folder": "extract {} -o OUT --refine noise", "points": "extract {} -o OUT.ply --refine noise,agree"}
+
 
 def noisy_of_many(args, folder):
     """What takes more for many noisy views than for few, or is not the same as from memory."""
@@ -153,6 +154,7 @@ FILMS = {"exr to exr": "convert {}_%d.exr -o OUT_%d.exr", "exr to mp4": "convert
          "set to exr": "convert {} -o OUT_%d.exr", "set to mp4": "convert {} -o OUT.mp4",
          "folder of exr": "extract {}_%d.exr -o OUT --refine off", "folder of mp4": "extract {}.mp4 -o OUT --refine off",
          "sheet of exr": "sheet {}_%d.exr -o OUT.png --refine off", "sheet of mp4": "sheet {}.mp4 -o OUT.png --refine off"}
+
 
 def film_of_many(args, folder):
     """What takes more for films of many views than of few, or is not the same as from memory."""

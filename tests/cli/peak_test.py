@@ -111,6 +111,7 @@ def above_info(args, folder):
 # Of a cloud of points whose discs all at once would take four times as much, MiB.
 CLOUD_LIMIT = 60
 
+
 def clouds(args, folder):
     """Points everywhere in a box, which become discs, and a hundred in each of a thousand places, which become half balls."""
     wrong, numbers = [], random.Random(1)
