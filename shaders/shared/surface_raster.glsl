@@ -5,6 +5,7 @@
 //   Axis frameAxis(), float relativeScale(Axis, q)  of the frame: see surface_votes.glsl
 //   bool mayDraw(x, y, behind)   whether a sample is free or holds less than `behind`: extensions are
 //                                drawn only there
+//   placed(), cutInFront()       of surface_cut.glsl
 //   void raise(x, y, value)      makes a sample at least as near as `value`, bits of q and flags
 
 // Samples of the convex polygon with these edges (ex x + ey y + e0 >= 0), this plane of q and this
@@ -46,36 +47,15 @@ void fillPolygon(vec3 a, vec3 b, vec3 c, vec3 d, float grow, uint flags) {
          vec2(low) - grow, vec2(high) + grow, flags);
 }
 
-vec3 placed(vec4 corner) { return vec3(corner) * (1.0f / corner.w); }
-
-// The same from corners of toSamples(). What reaches behind the camera is cut: its corners in front and
-// places on its edges are drawn as triangles.
+// The same from corners of toSamples(). What reaches behind the camera is cut, and drawn as triangles.
 void fillQuad(vec4 a, vec4 b, vec4 c, vec4 d, float grow, uint flags) {
-    float most = max(max(a.w, b.w), max(c.w, d.w));
     if (min(min(a.w, b.w), min(c.w, d.w)) > 0.0f) {
         fillPolygon(placed(a), placed(b), placed(c), placed(d), grow, flags);
         return;
     }
-    float cut = kNearestShare * most;
-    if (!(cut > 0.0f)) return;
-    vec3 first = vec3(0.0f), before = vec3(0.0f);
-    int count = 0;
-    vec4 from = a;
-    for (int i = 0; i < 4; ++i) {
-        vec4 to = i == 0 ? b : i == 1 ? c : i == 2 ? d : a;
-        for (int j = 0; j < 2; ++j) {
-            // A corner, then where the edge behind it is cut.
-            bool there = j == 0 ? from.w >= cut : (from.w >= cut) != (to.w >= cut);
-            if (!there) continue;
-            vec4 at = j == 0 ? from : from + (to - from) * ((from.w - cut) / (from.w - to.w));
-            vec3 corner = placed(at);
-            if (count == 0) first = corner;
-            if (count > 1) fillPolygon(first, before, corner, first, grow, flags);
-            before = corner;
-            ++count;
-        }
-        from = to;
-    }
+    vec3 kept[5];
+    int count = cutInFront(a, b, c, d, kept);
+    for (int k = 2; k < count; ++k) fillPolygon(kept[0], kept[k - 1], kept[k], kept[0], grow, flags);
 }
 
 // A quad whose last corner is its first again: that edge holds everywhere, the plane is the same.

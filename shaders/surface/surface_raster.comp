@@ -31,6 +31,7 @@ void raise(int x, int y, uint value) {
     uint at = sampleNumber(x, y);
     if (value > samples[at]) atomicMax(samples[at], value);
 }
+#include "shared/surface_cut.glsl"
 #include "shared/surface_raster.glsl"
 
 void main() {

@@ -31,6 +31,17 @@ PRUNE_LIMIT = 224
 CUBE_LIMIT = 80
 
 
+def compare(args, name, every, few, most, same, made, wrong):
+    """Adds to `wrong` a run of `few` views at a time that takes more than `most` MiB, or whose result is not that of `every` view in memory."""
+    peak = few.usage.ru_maxrss / 1024
+    if args.measure:
+        print(f"{name:46} {peak:6.1f} MiB, in memory {every.usage.ru_maxrss / 1024:6.1f}", flush=True)
+    elif peak > most:
+        wrong.append(f"{name}: {peak:.1f} MiB")
+    if not same:
+        wrong.append(f"{name}: {made} not that of a larger --max-memory")
+
+
 def from_few(args, folder):
     """What is not the same, or takes too much, of pictures of 36 views that do not fit memory."""
     wrong = []
@@ -43,13 +54,7 @@ def from_few(args, folder):
             every = must([args.stx] + line + ["-o", "all_%d.png"], folder)
             few = must([args.stx] + line + ["-o", "few_%d.png", "--max-memory", str(FEW_LIMIT)], folder)
             pictures = [open(os.path.join(folder, f"{which}_{i}.png"), "rb").read() for which in ("all", "few") for i in range(3)]
-            peak = few.usage.ru_maxrss / 1024
-            if args.measure:
-                print(f"{name:46} {peak:6.1f} MiB, in memory {every.usage.ru_maxrss / 1024:6.1f}", flush=True)
-            elif peak > FEW:
-                wrong.append(f"{name}: {peak:.1f} MiB")
-            if pictures[:3] != pictures[3:]:
-                wrong.append(f"{name}: the pictures are not those of a larger --max-memory")
+            compare(args, name, every, few, FEW, pictures[:3] == pictures[3:], "what it draws is", wrong)
     return wrong
 
 
@@ -64,16 +69,10 @@ def model_of_few(args, folder):
         if args.only not in name:
             continue
         line = ["extract", f"many36{kind}", "--threads", "2"] + options.split() + ["-o"]
-        every = must([args.stx] + line + ["all." + ending, "--max-memory", "16384"], folder)
+        every = must([args.stx] + line + ["all." + ending, "--max-memory", str(IN_MEMORY)], folder)
         few = must([args.stx] + line + ["few." + ending, "--max-memory", str(limit)], folder)
         models = [files_of(os.path.join(folder, f"{which}.{ending}")) for which in ("all", "few")]
-        peak = few.usage.ru_maxrss / 1024
-        if args.measure:
-            print(f"{name:46} {peak:6.1f} MiB, in memory {every.usage.ru_maxrss / 1024:6.1f}", flush=True)
-        elif peak > most:
-            wrong.append(f"{name}: {peak:.1f} MiB")
-        if models[0] != models[1]:
-            wrong.append(f"{name}: the model is not that of a larger --max-memory")
+        compare(args, name, every, few, most, models[0] == models[1], "the model is", wrong)
     return wrong
 
 
@@ -136,8 +135,7 @@ def cube_of_few(args, folder):
 def film_of_few(args, folder):
     """What is not the same, or takes too much, of pictures of a film whose frames do not fit memory."""
     wrong = []
-    films = [("surface", "film_%d.exr"), ("surface", "film.mp4"), ("surface", "film"), ("splat", "film_%d.exr")]
-    films = [(mode, film) for mode, film in films if args.only in f"film {mode} {film}"]
+    films = [(mode, film) for mode in ("surface", "splat") for film in ("film_%d.exr", "film.mp4", "film") if args.only in f"film {mode} {film}"]
     if not films:
         return wrong
     film_set(os.path.join(folder, "film"), TURNED_VIEWS, 512)

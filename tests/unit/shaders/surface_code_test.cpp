@@ -48,6 +48,7 @@ struct ScalarRaster {
     }
     void raise(int x, int y, uint value) { sample(x, y) = std::max(sample(x, y), value); }
 
+#include "shaders/shared/surface_cut.glsl"
 #include "shaders/shared/surface_raster.glsl"
 
     void drawAll(const Source& s) {

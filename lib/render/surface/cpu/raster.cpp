@@ -40,32 +40,26 @@ struct Projection {
     }
 };
 
-/// Draws what is in front of the camera of a convex polygon of a source that reaches behind it, as
-/// shared/surface_raster.glsl does. `corners`: positions and q in the source.
+namespace shared {
+using namespace stx::glsl;
+#include "shaders/shared/surface_cut.glsl"
+}  // namespace shared
+
+/// Draws what is in front of the camera of a convex polygon of a source that reaches behind it.
+/// `corners`: positions and q in the source.
 HWY_NOINLINE void drawInFront(Target& t, const Warp& warp, const std::array<glm::vec3, 4>& corners,
                               float grow, std::uint32_t flags, Extent& extent) {
-    std::array<glm::vec4, 4> at;
-    float most = 0.0f;
-    for (std::size_t i = 0; i < 4; ++i) {
-        at[i] = warp.homogeneous(corners[i].x, corners[i].y, corners[i].z);
-        most = std::max(most, at[i].w);
-    }
-    const float cut = kNearestShare * most;
-    const auto placed = [](glm::vec4 corner) { return glm::vec3(corner) * (1.0f / corner.w); };
-    std::array<glm::vec3, 5> kept;
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < 4 && cut > 0; ++i) {
-        const glm::vec4 &from = at[i], &to = at[(i + 1) % 4];
-        if (from.w >= cut) kept[count++] = placed(from);
-        if ((from.w >= cut) != (to.w >= cut))
-            kept[count++] = placed(from + (to - from) * ((from.w - cut) / (from.w - to.w)));
-    }
+    const auto at = [&](std::size_t i) {
+        return warp.homogeneous(corners[i].x, corners[i].y, corners[i].z);
+    };
+    glm::vec3 kept[5];
+    const int count = shared::cutInFront(at(0), at(1), at(2), at(3), kept);
     const FloatTag d;
     Polygons p;
     p.there = hn::FirstN(d, 1);
     p.grow = hn::Set(d, grow);
     p.flags = hn::Set(BitTag(), flags);
-    for (std::size_t k = 2; k < count; ++k) {
+    for (int k = 2; k < count; ++k) {
         const std::array corner{kept[0], kept[k - 1], kept[k], kept[0]};
         for (std::size_t c = 0; c < 4; ++c) {
             p.x[c] = hn::Set(d, corner[c].x);
