@@ -32,11 +32,10 @@ struct FileSplats {
     [[nodiscard]] Result<void> resize(std::size_t count, int degree, const Limits& limits);
 };
 
-/// A mesh that is drawn as these splats, after dropBroken(): positions are their centres, from an
-/// origin where floats would lose too much (originFor(); a note says so), and points are those that
-/// frame it: of splats that hide half or more of what is behind them, or, where none does, half as
-/// much as the one that hides most. Errors: no splat is left,
-/// memory over the limit.
+/// A mesh that is drawn as these splats, after dropBroken(). Positions are their centres, from an
+/// origin where floats would lose too much (originFor(); a note says so). Points are those that
+/// frame it: splats that hide half or more of what is behind them, or, where none does, at least
+/// half as much as the one that hides most. Errors: no splat is left, memory over the limit.
 [[nodiscard]] Result<Mesh> meshOfSplats(FileSplats splats, Job& job);
 
 /// Whether a PLY file is a cloud of splats: its vertices have opacity, scales, a rotation and a
