@@ -464,7 +464,7 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         std::optional<Bytes> usual;
         if (format == AssimpFormat::obj) {
             faces = objFaces(bytes);
-            usual = withLeadingZeros(bytes);
+            usual = plainObj(bytes);
             if (faces.smoothWithoutNormals)
                 if (auto smooth = withSmoothNormals(usual ? ByteSpan(*usual) : bytes))
                     usual = std::move(smooth);

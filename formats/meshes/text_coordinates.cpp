@@ -79,28 +79,38 @@ bool isDigit(char c) {
 
 }  // namespace
 
-std::optional<Bytes> withLeadingZeros(ByteSpan bytes) {
+std::optional<Bytes> plainObj(ByteSpan bytes) {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     Bytes out;
-    std::size_t copied = 0;
-    bool continued = false, values = false;
+    std::size_t copied = 0;  // of the text
+    const auto replace = [&](std::size_t from, std::size_t to, std::string_view by) {
+        append(out, text.substr(copied, from - copied));
+        append(out, by);
+        copied = to;
+    };
+    bool continued = false, values = false, elements = false;
     for (std::size_t start = 0, end = 0; start < text.size(); start = end + 1) {
         end = std::min(text.find('\n', start), text.size());
-        const auto line = trimmed(text.substr(start, end - start));
-        if (!continued) values = line.starts_with('v');
-        continued = line.ends_with('\\');
-        if (!values) continue;
-        // To the line's end: another point may be far away.
-        const auto upTo = text.substr(0, end);
-        for (auto at = upTo.find('.', start); at < end; at = upTo.find('.', at + 1)) {
-            const bool first = at == start || isBlank(text[at - 1]);
-            if (!first || at + 1 >= end || !isDigit(text[at + 1])) continue;
-            append(out, text.substr(copied, at - copied));
-            append(out, "0");
-            copied = at;
+        auto line = trimmed(text.substr(start, end - start));
+        if (!continued) {
+            values = line.starts_with('v');
+            elements = line.size() > 1 && (line[0] == 'f' || line[0] == 'l' || line[0] == 'p') &&
+                       isBlank(line[1]);
         }
+        continued = line.ends_with('\\');
+        if (!values && !elements) continue;
+        // To the line's end: another point, another comment may be far away.
+        const auto upTo = text.substr(0, end);
+        const auto comment = std::min(upTo.find('#', start), end);
+        for (auto at = upTo.find('.', start); at < comment; at = upTo.find('.', at + 1)) {
+            const bool first = at == start || isBlank(text[at - 1]);
+            if (first && at + 1 < end && isDigit(text[at + 1])) replace(at, at, "0");
+        }
+        if (comment == end) continue;
+        replace(comment, end, "");
+        continued = false;
     }
-    if (out.empty()) return std::nullopt;
+    if (copied == 0) return std::nullopt;
     append(out, text.substr(copied));
     return out;
 }

@@ -15,10 +15,12 @@ struct PlainText {
     glm::dvec3 origin{0.0};  ///< is subtracted from the coordinates
 };
 
-/// OBJ text in which the numbers of `v`, `vt`, `vn` have a digit before their point: `.5`, which
-/// Wavefront's specification allows, becomes `0.5`, since Assimp counts words that begin with a
-/// digit or a sign only. Nothing when all numbers have one.
-[[nodiscard]] std::optional<Bytes> withLeadingZeros(ByteSpan text);
+/// OBJ text as Assimp reads what it means; nothing when it is so already:
+///  - The numbers of `v`, `vt`, `vn` have a digit before their point: `.5`, which Wavefront's
+///    specification allows, becomes `0.5`, since Assimp counts words that begin with a digit or a
+///    sign only.
+///  - Nothing is behind them and behind `f`, `l`, `p`: Assimp takes a comment there for a corner.
+[[nodiscard]] std::optional<Bytes> plainObj(ByteSpan text);
 
 /// Rewrites the lines that begin with `keyword` ("v" of OBJ, "vertex" of STL) where Assimp would
 /// lose what they say:

@@ -68,8 +68,22 @@ TEST(Obj, NumbersWithoutPointsTakeNoLongerThanOthers) {
     std::string text;
     for (int i = 0; i < 200000; ++i) text += "v 1 2 3\n";
     const auto before = std::clock();
-    EXPECT_FALSE(withLeadingZeros(std::as_bytes(std::span(text))));
+    EXPECT_FALSE(plainObj(std::as_bytes(std::span(text))));
     EXPECT_LT(static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC, 1.0);
+}
+
+TEST(Obj, LinesMayEndInAComment) {
+    const std::string plain = "v 0 0 0\nv 1 0 0\nv 0 .5 0\nvt 0 0\nvt 1 0\nvt 0 1\n";
+    const auto without = readGoodText(plain + "f 1/1 2/2 3/3\nf 3/3 2/2 1/1\n", "a.obj");
+    const auto with = readGoodText(
+        "v 0 0 0 # 1.5\nv 1 0 0\t#\r\nv 0 .5 0# .5 \nvt 0 0#\nvt 1 0 # 1\nvt 0 1 # .5 .5\n"
+        "usemtl a#b\nf 1/1 2/2 \\\n3/3 # base \\\nf 3/3 2/2 1/1#4/4\n#f 1 2 3",
+        "a.obj");
+    ASSERT_EQ(with.mesh.triangles.size(), 2u);
+    EXPECT_EQ(with.mesh.triangles, without.mesh.triangles);
+    EXPECT_EQ(with.mesh.positions, without.mesh.positions);
+    EXPECT_EQ(with.mesh.uvs, without.mesh.uvs);
+    EXPECT_TRUE(with.hasNote("material 'a#b'"));
 }
 
 TEST(Mtl, LinesOfNoUseAreLeftOut) {
