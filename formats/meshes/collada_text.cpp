@@ -16,6 +16,7 @@
 #include "formats/files/text_encoding.hpp"
 #include "formats/meshes/collada_joints.hpp"
 #include "formats/meshes/collada_tags.hpp"
+#include "formats/meshes/collada_texture_sets.hpp"
 
 namespace stx {
 
@@ -72,170 +73,11 @@ Result<std::optional<glm::dmat4>> skew(std::string_view values) {
     return glm::dmat4(glm::dmat3(1.0) + glm::outerProduct(along, aside / sine) * shift);
 }
 
-std::uint32_t numberIn(std::string_view digits) {
-    std::uint32_t number = 0;
-    std::from_chars(digits.data(), digits.data() + digits.size(), number);
-    return number;
-}
-
 /// What Maya says in a texture of a sampler's wrap_s ('U') or wrap_t ('V'), which Assimp reads.
 std::string mayaWrap(std::string_view wrap, char axis) {
     if (trimmed(wrap) == "CLAMP") return fmt::format("<wrap{0}>0</wrap{0}>", axis);
     if (trimmed(wrap) == "MIRROR") return fmt::format("<mirror{0}>1</mirror{0}>", axis);
     return {};
-}
-
-/// The sets of texture coordinates that textures are drawn with. Textures say a name, instances of
-/// geometry say which set it is there. Assimp ignores what they say: a texture has a number, and
-/// a mesh the sets that it has, without gaps. Here the numbers count the names of an effect, but
-/// for those that all instances bind alike, and the parts of a geometry get their sets in that
-/// order.
-class TextureSets {
-  public:
-    /// Takes in the tag at `at`; all of them in their order, then resolve().
-    void read(std::string_view text, std::size_t at);
-    void resolve();
-    /// The number of what a texture of an effect names.
-    [[nodiscard]] std::size_t numberOf(std::string_view effect, std::string_view name) const {
-        const auto known = numbers_.find({effect, name});
-        return known == numbers_.end() ? 0 : known->second;
-    }
-    /// The numbers that the coordinates of the `input` at `at` get as sets; none: as they are.
-    [[nodiscard]] std::vector<std::size_t> setsOf(std::size_t at) const {
-        const auto known = sets_.find(at);
-        return known == sets_.end() ? std::vector<std::size_t>() : known->second;
-    }
-    /// What is bound to sets that differ, where one must do; empty: nothing.
-    [[nodiscard]] std::string_view boundTwice() const { return boundTwice_; }
-
-  private:
-    static constexpr std::uint32_t kUnbound = UINT32_MAX;
-    static constexpr std::size_t kMostNames = 8;  ///< as many sets as Assimp reads
-    /// A material of a part of a geometry, and the sets by the names of textures.
-    struct Instance {
-        std::string_view geometry, symbol, material;
-        std::map<std::string_view, std::uint32_t> sets;
-    };
-    struct Part {
-        std::string_view geometry, symbol;
-        std::vector<std::pair<std::uint32_t, std::size_t>> inputs;  ///< sets, and where they are
-    };
-    void bind(std::string_view text);
-    void plan(const Part& part, const std::vector<std::uint32_t>& bound);
-
-    std::string_view effect_, material_, controller_, geometry_, instance_;  ///< that is open
-    bool inPart_ = false;
-    std::map<std::string_view, std::vector<std::string_view>> names_;  ///< of an effect's textures
-    std::map<std::string_view, std::string_view> effectOf_,
-        skinned_;  ///< of materials, controllers
-    std::vector<Part> parts_;
-    std::vector<Instance> instances_;
-    std::map<std::pair<std::string_view, std::string_view>, std::size_t> numbers_;
-    std::map<std::size_t, std::vector<std::size_t>> sets_;  ///< by where inputs are
-    std::string_view boundTwice_;
-};
-
-void TextureSets::read(std::string_view text, std::size_t at) {
-    constexpr std::string_view kParts[] = {"triangles", "trifans", "tristrips", "polylist",
-                                           "polygons",  "lines",   "linestrips"};
-    const auto tag = text.substr(at);
-    const auto name = collada::nameOf(tag);
-    const auto reference = [&](std::string_view attribute) {
-        auto id = collada::attributeOf(tag, attribute);
-        if (id.starts_with('#')) id.remove_prefix(1);
-        return id;
-    };
-    if (name == "effect") effect_ = collada::attributeOf(tag, "id");
-    if (name == "material") material_ = collada::attributeOf(tag, "id");
-    if (name == "controller") controller_ = collada::attributeOf(tag, "id");
-    if (name == "geometry") geometry_ = collada::attributeOf(tag, "id");
-    if (name == "texture") {
-        auto& names = names_[effect_];
-        const auto texcoord = collada::attributeOf(tag, "texcoord");
-        if (!texcoord.empty() && names.size() < kMostNames &&
-            std::ranges::find(names, texcoord) == names.end())
-            names.push_back(texcoord);
-    }
-    if (name == "instance_effect") effectOf_.emplace(material_, reference("url"));
-    if (name == "skin" || name == "morph") skinned_.emplace(controller_, reference("source"));
-    if (name == "instance_geometry" || name == "instance_controller") instance_ = reference("url");
-    if (name == "instance_material")
-        instances_.push_back(
-            {instance_, collada::attributeOf(tag, "symbol"), reference("target"), {}});
-    if (name == "bind_vertex_input" && !instances_.empty()) bind(tag);
-    if (std::ranges::find(kParts, name) != std::end(kParts)) {
-        parts_.push_back({geometry_, collada::attributeOf(tag, "material"), {}});
-        inPart_ = true;
-    }
-    if (name.starts_with('/') && std::ranges::find(kParts, name.substr(1)) != std::end(kParts))
-        inPart_ = false;
-    if (inPart_ && name == "input" && collada::attributeOf(tag, "semantic") == "TEXCOORD")
-        parts_.back().inputs.emplace_back(numberIn(collada::attributeOf(tag, "set")), at);
-}
-
-void TextureSets::bind(std::string_view text) {
-    const auto set = numberIn(collada::attributeOf(text, "input_set"));
-    const auto [bound, isNew] =
-        instances_.back().sets.emplace(collada::attributeOf(text, "semantic"), set);
-    if (!isNew && bound->second != set && boundTwice_.empty()) boundTwice_ = bound->first;
-}
-
-void TextureSets::resolve() {
-    std::map<std::string_view, std::vector<const Instance*>> instancesOf;
-    for (Instance& instance : instances_) {
-        // At most the skin of a morph of a geometry.
-        for (int k = 0; k < 2; ++k)
-            if (const auto under = skinned_.find(instance.geometry); under != skinned_.end())
-                instance.geometry = under->second;
-        if (const auto effect = effectOf_.find(instance.material); effect != effectOf_.end())
-            instancesOf[effect->second].push_back(&instance);
-    }
-    std::map<std::pair<std::string_view, std::string_view>, std::vector<std::uint32_t>> bound;
-    for (const auto& [effect, names] : names_) {
-        const auto& instances = instancesOf[effect];
-        const auto setIn = [](const Instance& instance, std::string_view name) {
-            const auto set = instance.sets.find(name);
-            return set == instance.sets.end() ? kUnbound : set->second;
-        };
-        std::map<std::vector<std::uint32_t>, std::size_t> numbers;
-        std::vector<std::string_view> firsts;
-        for (const auto name : names) {
-            std::vector<std::uint32_t> sets;
-            for (const auto* instance : instances) sets.push_back(setIn(*instance, name));
-            const auto [number, isNew] = numbers.emplace(std::move(sets), numbers.size());
-            if (isNew) firsts.push_back(name);
-            numbers_[{effect, name}] = number->second;
-        }
-        for (const auto* instance : instances) {
-            std::vector<std::uint32_t> sets;
-            for (const auto name : firsts) sets.push_back(setIn(*instance, name));
-            auto& known = bound[{instance->geometry, instance->symbol}];
-            const auto [here, there] = std::ranges::mismatch(sets, known);
-            if (here == sets.end()) continue;
-            if (there == known.end())
-                known = std::move(sets);
-            else if (boundTwice_.empty())
-                boundTwice_ = firsts[static_cast<std::size_t>(here - sets.begin())];
-        }
-    }
-    for (const Part& part : parts_)
-        if (const auto sets = bound.find({part.geometry, part.symbol}); sets != bound.end())
-            plan(part, sets->second);
-}
-
-/// Sets that nothing binds, or that the part does not have, are its first.
-void TextureSets::plan(const Part& part, const std::vector<std::uint32_t>& bound) {
-    if (part.inputs.empty() || bound.empty()) return;
-    const auto first = std::ranges::min(part.inputs);
-    for (std::size_t number = 0; number < bound.size(); ++number) {
-        const auto input = std::ranges::find(part.inputs, bound[number],
-                                             &std::pair<std::uint32_t, std::size_t>::first);
-        sets_[input == part.inputs.end() ? first.second : input->second].push_back(number);
-    }
-    // What no texture uses stays, since it has a place among the indices.
-    std::size_t number = bound.size();
-    for (const auto& [set, at] : part.inputs)
-        if (auto& sets = sets_[at]; sets.empty()) sets.push_back(number++);
 }
 
 /// The same without the prefix that the root's name has; nothing where it has none.
@@ -344,139 +186,189 @@ class Morphs {
     std::map<std::string_view, std::string_view> bases_;
 };
 
+/// Writes the text again, tag by tag.
+class Rewriter {
+  public:
+    explicit Rewriter(std::string_view text) : text_(text) {}
+    /// What tags must know of others that come behind them.
+    Result<void> read();
+    Result<PlainCollada> write();
+
+  private:
+    Result<void> writeTag(std::size_t at);
+    void writeMorph(std::size_t at);
+    /// False: the tag is about no hole.
+    bool writeHole(std::size_t at);
+    void readWraps(std::size_t at);
+    void writeTexture(std::size_t at);
+    void writeInput(std::size_t at, const std::vector<std::size_t>& numbers);
+    Result<void> writeTransform(std::size_t at);
+    void replace(std::size_t from, std::size_t to, std::string_view with) {
+        out_.text += text_.substr(copied_, from - copied_);
+        out_.text += with;
+        copied_ = to;
+    }
+    /// `part` is one of the text.
+    void replace(std::string_view part, std::string_view with) {
+        const auto from = static_cast<std::size_t>(part.data() - text_.data());
+        replace(from, from + part.size(), with);
+    }
+
+    std::string_view text_;
+    PlainCollada out_;
+    std::size_t copied_ = 0;  ///< of the text
+    EffectColours colours_;
+    Morphs morphs_;
+    ColladaJoints joints_;
+    ColladaTextureSets sets_;
+    bool inMorph_ = false, hasHoles_ = false;  ///< of what is open
+    std::string_view effect_, parameter_;      ///< that is open
+    /// Of an effect's parameters, by sid: along s and t.
+    std::map<std::string_view, std::pair<std::string, std::string>> wraps_;
+};
+
+Result<void> Rewriter::read() {
+    STX_CHECK(collada::eachTag(text_, [&](std::size_t at) -> Result<void> {
+        sets_.read(text_, at);
+        morphs_.read(text_, at);
+        joints_.read(text_, at);
+        for (const std::string_view name : {"wrap_s", "wrap_t"}) {
+            const auto wrap = trimmed(collada::contentOf(text_.substr(at), name));
+            const bool known =
+                wrap.empty() || wrap == "WRAP" || wrap == "CLAMP" || wrap == "MIRROR";
+            if (out_.wrap.empty() && !known) out_.wrap = wrap;
+        }
+        return {};
+    }));
+    sets_.resolve();
+    joints_.resolve();
+    out_.morphs = morphs_.count();
+    out_.twoSkeletons = joints_.twoSkeletons();
+    out_.boundTwice = sets_.boundTwice();
+    return {};
+}
+
+Result<PlainCollada> Rewriter::write() {
+    STX_CHECK(collada::eachTag(
+        text_, [&](std::size_t at) { return at < copied_ ? Result<void>() : writeTag(at); }));
+    out_.text += text_.substr(copied_);
+    return std::move(out_);
+}
+
+Result<void> Rewriter::writeTag(std::size_t at) {
+    std::size_t readTo = at;
+    if (const auto colour = colours_.read(text_, at, readTo)) replace(at, readTo, *colour);
+    writeMorph(at);
+    if (const auto joint = joints_.replacedAt(text_, at))
+        replace(joint->from, joint->to, joint->with);
+    if (writeHole(at)) return {};
+    readWraps(at);
+    if (text_.substr(at).starts_with("<texture")) {
+        writeTexture(at);
+    } else if (const auto numbers = sets_.setsOf(at); !numbers.empty()) {
+        writeInput(at, numbers);
+    } else {
+        return writeTransform(at);
+    }
+    return {};
+}
+
+/// What is an instance, or a skin, of a morph becomes that of its base.
+void Rewriter::writeMorph(std::size_t at) {
+    const auto tag = text_.substr(at);
+    const auto name = collada::nameOf(tag);
+    if (name == "controller" && morphs_.baseOf(collada::attributeOf(tag, "id")))
+        return replace(at, collada::endOfElement(text_, at), "");
+    if (name == "/instance_controller" && std::exchange(inMorph_, false))
+        return replace(at, at + 1 + name.size(), "</instance_geometry");
+    if (name != "instance_controller" && name != "skin") return;
+    const auto reference = collada::attributeOf(tag, name == "skin" ? "source" : "url");
+    const auto base = morphs_.baseOf(reference);
+    if (!base) return;
+    if (name != "skin") {
+        replace(at, at + 1 + name.size(), "<instance_geometry");
+        inMorph_ = !text_.substr(0, collada::endOfTag(text_, at)).ends_with("/>");
+    }
+    replace(reference, fmt::format("#{}", *base));
+}
+
+bool Rewriter::writeHole(std::size_t at) {
+    const auto element = collada::nameOf(text_.substr(at));
+    if (element == "ph" || element == "/ph") {
+        hasHoles_ = element == "ph";
+        replace(at, collada::endOfTag(text_, at), "");
+        return true;
+    }
+    if (!hasHoles_ || element != "h") return false;
+    ++out_.holes;
+    replace(at, collada::endOfElement(text_, at), "");
+    return true;
+}
+
+void Rewriter::readWraps(std::size_t at) {
+    const auto tag = text_.substr(at);
+    if (collada::nameOf(tag) == "effect") {
+        wraps_.clear();
+        effect_ = collada::attributeOf(tag, "id");
+    }
+    if (tag.starts_with("<newparam")) parameter_ = collada::attributeOf(tag, "sid");
+    if (auto wrap = mayaWrap(collada::contentOf(tag, "wrap_s"), 'U'); !wrap.empty())
+        wraps_[parameter_].first = std::move(wrap);
+    if (auto wrap = mayaWrap(collada::contentOf(tag, "wrap_t"), 'V'); !wrap.empty())
+        wraps_[parameter_].second = std::move(wrap);
+}
+
+void Rewriter::writeTexture(std::size_t at) {
+    const auto tag = text_.substr(at);
+    if (const auto name = collada::attributeOf(tag, "texcoord"); !name.empty())
+        replace(name, fmt::format("{}", sets_.numberOf(effect_, name)));
+    const auto wrap = wraps_.find(collada::attributeOf(tag, "texture"));
+    const auto end = text_.find_first_of("<>", at + 1);
+    if (wrap == wraps_.end() || end == std::string_view::npos || text_[end] == '<') return;
+    const bool isEmpty = text_[end - 1] == '/';
+    replace(isEmpty ? end - 1 : end, end + 1,
+            fmt::format("><extra><technique profile=\"MAYA\">{}{}</technique></extra>{}",
+                        wrap->second.first, wrap->second.second, isEmpty ? "</texture>" : ""));
+}
+
+/// Copies of an `input`, then the tag itself with its own attributes.
+void Rewriter::writeInput(std::size_t at, const std::vector<std::size_t>& numbers) {
+    const auto tag = text_.substr(at);
+    const auto source = collada::attributeOf(tag, "source"),
+               offset = collada::attributeOf(tag, "offset");
+    std::string before;
+    for (std::size_t k = 1; k < numbers.size(); ++k)
+        before +=
+            fmt::format("<input semantic=\"TEXCOORD\" source=\"{}\" offset=\"{}\" set=\"{}\"/>",
+                        source, offset, numbers[k]);
+    replace(at, at, before);
+    if (const auto set = collada::attributeOf(tag, "set"); !set.empty())
+        return replace(set, fmt::format("{}", numbers[0]));
+    const auto end = at + std::string_view("<input").size();
+    replace(end, end, fmt::format(" set=\"{}\"", numbers[0]));
+}
+
+Result<void> Rewriter::writeTransform(std::size_t at) {
+    const auto tag = text_.substr(at);
+    std::optional<glm::dmat4> parentFromHere = lookat(collada::contentOf(tag, "lookat"));
+    const auto skewed = collada::contentOf(tag, "skew");
+    if (!skewed.empty()) STX_SET(parentFromHere, skew(skewed));
+    if (!parentFromHere) return {};
+    std::string matrix = "<matrix>";
+    for (int row = 0; row < 4; ++row)
+        for (int column = 0; column < 4; ++column)
+            matrix += fmt::format("{} ", (*parentFromHere)[column][row]);
+    replace(at, text_.find('>', text_.find('<', at + 1)) + 1, matrix + "</matrix>");
+    return {};
+}
+
 }  // namespace
 
 Result<PlainCollada> plainCollada(ByteSpan bytes) {
     const auto plain = withoutPrefix(textOf(bytes));
-    const std::string_view text = plain ? std::string_view(*plain) : textOf(bytes);
-    PlainCollada out;
-    EffectColours colours;
-    Morphs morphs;
-    ColladaJoints joints;
-    TextureSets sets;
-    STX_CHECK(collada::eachTag(text, [&](std::size_t at) -> Result<void> {
-        const auto tag = text.substr(at);
-        sets.read(text, at);
-        morphs.read(text, at);
-        joints.read(text, at);
-        for (const std::string_view name : {"wrap_s", "wrap_t"}) {
-            const auto wrap = trimmed(collada::contentOf(tag, name));
-            const bool known =
-                wrap.empty() || wrap == "WRAP" || wrap == "CLAMP" || wrap == "MIRROR";
-            if (out.wrap.empty() && !known) out.wrap = wrap;
-        }
-        return {};
-    }));
-    sets.resolve();
-    joints.resolve();
-    out.morphs = morphs.count();
-    out.twoSkeletons = joints.twoSkeletons();
-    out.boundTwice = sets.boundTwice();
-    std::string_view effect;
-    // Of an effect's parameters, by sid: along s and t.
-    std::map<std::string_view, std::pair<std::string, std::string>> wraps;
-    std::string_view parameter;
-    std::size_t copied = 0;
-    const auto replace = [&](std::size_t from, std::size_t to, std::string_view with) {
-        out.text += text.substr(copied, from - copied);
-        out.text += with;
-        copied = to;
-    };
-    bool inMorph = false, hasHoles = false;
-    // What is an instance, or a skin, of a morph becomes that of its base.
-    const auto replaceMorph = [&](std::size_t at) {
-        const auto tag = text.substr(at);
-        const auto name = collada::nameOf(tag);
-        if (name == "controller" && morphs.baseOf(collada::attributeOf(tag, "id")))
-            return replace(at, collada::endOfElement(text, at), "");
-        if (name == "/instance_controller" && std::exchange(inMorph, false))
-            return replace(at, at + 1 + name.size(), "</instance_geometry");
-        if (name != "instance_controller" && name != "skin") return;
-        const auto reference = collada::attributeOf(tag, name == "skin" ? "source" : "url");
-        const auto base = morphs.baseOf(reference);
-        if (!base) return;
-        if (name != "skin") {
-            replace(at, at + 1 + name.size(), "<instance_geometry");
-            inMorph = !text.substr(0, collada::endOfTag(text, at)).ends_with("/>");
-        }
-        const auto from = static_cast<std::size_t>(reference.data() - text.data());
-        replace(from, from + reference.size(), fmt::format("#{}", *base));
-    };
-    STX_CHECK(collada::eachTag(text, [&](std::size_t at) -> Result<void> {
-        if (at < copied) return {};
-        const auto tag = text.substr(at);
-        const auto element = collada::nameOf(tag);
-        std::size_t readTo = at;
-        if (const auto colour = colours.read(text, at, readTo)) replace(at, readTo, *colour);
-        replaceMorph(at);
-        if (const auto joint = joints.replacedAt(text, at))
-            replace(joint->from, joint->to, joint->with);
-        if (element == "ph" || element == "/ph") {
-            hasHoles = element == "ph";
-            replace(at, collada::endOfTag(text, at), "");
-            return {};
-        }
-        if (hasHoles && element == "h") {
-            ++out.holes;
-            replace(at, collada::endOfElement(text, at), "");
-            return {};
-        }
-        if (element == "effect") {
-            wraps.clear();
-            effect = collada::attributeOf(tag, "id");
-        }
-        if (tag.starts_with("<newparam")) parameter = collada::attributeOf(tag, "sid");
-        if (auto wrap = mayaWrap(collada::contentOf(tag, "wrap_s"), 'U'); !wrap.empty())
-            wraps[parameter].first = std::move(wrap);
-        if (auto wrap = mayaWrap(collada::contentOf(tag, "wrap_t"), 'V'); !wrap.empty())
-            wraps[parameter].second = std::move(wrap);
-        if (tag.starts_with("<texture")) {
-            if (const auto name = collada::attributeOf(tag, "texcoord"); !name.empty()) {
-                const auto from = static_cast<std::size_t>(name.data() - text.data());
-                replace(from, from + name.size(), fmt::format("{}", sets.numberOf(effect, name)));
-            }
-            const auto wrap = wraps.find(collada::attributeOf(tag, "texture"));
-            const auto end = text.find_first_of("<>", at + 1);
-            if (wrap == wraps.end() || end == std::string_view::npos || text[end] == '<') return {};
-            const bool isEmpty = text[end - 1] == '/';
-            replace(
-                isEmpty ? end - 1 : end, end + 1,
-                fmt::format("><extra><technique profile=\"MAYA\">{}{}</technique></extra>{}",
-                            wrap->second.first, wrap->second.second, isEmpty ? "</texture>" : ""));
-            return {};
-        }
-        if (const auto numbers = sets.setsOf(at); !numbers.empty()) {
-            // Copies, then the tag itself with its own attributes.
-            const auto source = collada::attributeOf(tag, "source"),
-                       offset = collada::attributeOf(tag, "offset");
-            std::string before;
-            for (std::size_t k = 1; k < numbers.size(); ++k)
-                before += fmt::format(
-                    "<input semantic=\"TEXCOORD\" source=\"{}\" offset=\"{}\" set=\"{}\"/>", source,
-                    offset, numbers[k]);
-            replace(at, at, before);
-            if (const auto set = collada::attributeOf(tag, "set"); !set.empty()) {
-                const auto from = static_cast<std::size_t>(set.data() - text.data());
-                replace(from, from + set.size(), fmt::format("{}", numbers[0]));
-            } else {
-                const auto end = at + std::string_view("<input").size();
-                replace(end, end, fmt::format(" set=\"{}\"", numbers[0]));
-            }
-            return {};
-        }
-        std::optional<glm::dmat4> parentFromHere = lookat(collada::contentOf(tag, "lookat"));
-        const auto skewed = collada::contentOf(tag, "skew");
-        if (!skewed.empty()) STX_SET(parentFromHere, skew(skewed));
-        if (!parentFromHere) return {};
-        std::string matrix = "<matrix>";
-        for (int row = 0; row < 4; ++row)
-            for (int column = 0; column < 4; ++column)
-                matrix += fmt::format("{} ", (*parentFromHere)[column][row]);
-        replace(at, text.find('>', text.find('<', at + 1)) + 1, matrix + "</matrix>");
-        return {};
-    }));
-    out.text += text.substr(copied);
-    return out;
+    Rewriter rewriter(plain ? std::string_view(*plain) : textOf(bytes));
+    STX_CHECK(rewriter.read());
+    return rewriter.write();
 }
 
 }  // namespace stx
