@@ -306,30 +306,31 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
     return 0;
 }
 
+constexpr const char* kAbout =
+    "Images and cameras of a bundle as plain files, its points as .ply or .drc, Gaussian "
+    "splats, a model of surfaces, a picture with depth, or a page that draws it in any "
+    "browser\n\n"
+    "  stx extract model.mp4 -o folder           transforms.json and PNGs\n"
+    "  stx extract model.mp4 -o folder --cameras miv\n"
+    "  stx extract film.mp4 -o folder            all frames, with their times\n"
+    "  stx extract model.mp4 -o points.ply\n"
+    "  stx extract model.mp4 -o cloud.ply --as splats    for any viewer of Gaussian splats\n"
+    "  stx extract film.mp4 -o film_%04d.spz             a file of splats for each frame\n"
+    "  stx extract model.mp4 -o model.glb        surfaces with textures, for any glTF viewer\n"
+    "  stx extract model.mp4 -o view.html        one file for browsers (WebGL 2)\n"
+    "  stx extract photo.mp4 -o photo.glb --triangles 200000\n"
+    "  stx extract photo.mp4 -o photo_rgbd.png   colour beside depth, white near\n"
+    "  stx extract photo.mp4 -o photo.jpg        and its depth in photo_depth.jpg\n\n"
+    "The page is turned by dragging, by keys and by touch, under a light that moves, and "
+    "plays\nfilms. Its address takes a camera: "
+    "view.html#eye=0,1,3&target=0,0,0&fov=40, time, light and more. Where --max-memory has no "
+    "room for all views "
+    "at\nonce, the page has more textures: it draws the same, in other bytes.";
+
 }  // namespace
 
 void addExtract(CommandLine& line, Program& program) {
-    Command c = line.add(
-        "extract",
-        "Images and cameras of a bundle as plain files, its points as .ply or .drc, Gaussian "
-        "splats, a model of surfaces, a picture with depth, or a page that draws it in any "
-        "browser\n\n"
-        "  stx extract model.mp4 -o folder           transforms.json and PNGs\n"
-        "  stx extract model.mp4 -o folder --cameras miv\n"
-        "  stx extract film.mp4 -o folder            all frames, with their times\n"
-        "  stx extract model.mp4 -o points.ply\n"
-        "  stx extract model.mp4 -o cloud.ply --as splats    for any viewer of Gaussian splats\n"
-        "  stx extract film.mp4 -o film_%04d.spz             a file of splats for each frame\n"
-        "  stx extract model.mp4 -o model.glb        surfaces with textures, for any glTF viewer\n"
-        "  stx extract model.mp4 -o view.html        one file for browsers (WebGL 2)\n"
-        "  stx extract photo.mp4 -o photo.glb --triangles 200000\n"
-        "  stx extract photo.mp4 -o photo_rgbd.png   colour beside depth, white near\n"
-        "  stx extract photo.mp4 -o photo.jpg        and its depth in photo_depth.jpg\n\n"
-        "The page is turned by dragging, by keys and by touch, under a light that moves, and "
-        "plays\nfilms. Its address takes a camera: "
-        "view.html#eye=0,1,3&target=0,0,0&fov=40, time, light and more. Where --max-memory has no "
-        "room for all views "
-        "at\nonce, the page has more textures: it draws the same, in other bytes.");
+    Command c = line.add("extract", kAbout);
     auto o = std::make_shared<ExtractOptions>();
     c.option("BUNDLE", o->input, "Bundle, film or atlas").required();
     c.option("-o,--output", o->output,

@@ -315,6 +315,66 @@ void noteMissing(SetView& view, int frame, const std::vector<std::string>& textu
     miss(view.depth, "depth", depths);
 }
 
+/// Finds the pictures of the cameras of a list.
+class MivPictures {
+  public:
+    /// `areSources`: the list says which of its cameras have pictures.
+    MivPictures(const path& folder, const ImageSetOptions& options, bool areSources,
+                const Limits& limits)
+        : folder_(folder), options_(options), areSources_(areSources), limits_(limits) {}
+    /// False: the camera has none, and need not have any.
+    Result<bool> find(const Json& camera, const std::string& place, SetView& view);
+    [[nodiscard]] int frames() const { return frames_; }
+
+  private:
+    const path& folder_;
+    const ImageSetOptions& options_;
+    bool areSources_;
+    const Limits& limits_;
+    int frames_ = 0;
+    bool counted_ = false;  ///< files with numbers, by those of the first camera that is there
+};
+
+Result<bool> MivPictures::find(const Json& camera, const std::string& place, SetView& view) {
+    const int frame = options_.frame;
+    const Search forTexture{folder_, camera, view, frame, "BitDepthColor", "ColorSpace"};
+    const Search forDepth{folder_, camera, view, frame, "BitDepthDepth", "DepthColorSpace"};
+    const auto patterns = [](const std::string& own, std::vector<std::string> usual) {
+        return own.empty() ? std::move(usual) : std::vector<std::string>{own};
+    };
+    const auto textures = patterns(options_.texturePattern, texturePatterns());
+    const auto depths = patterns(options_.depthPattern, depthPatterns());
+    const std::string texture = findFile(forTexture, textures);
+    const std::string depth = findFile(forDepth, depths);
+    if (texture.empty() || depth.empty()) {
+        // A list of the sources is a promise; else cameras without images are viewports.
+        if (!areSources_ && options_.texturePattern.empty() && options_.depthPattern.empty())
+            return false;
+        view.texture.name = texture;
+        view.depth.name = depth;
+        noteMissing(view, frame, textures, depths, place);
+        return true;
+    }
+    STX_TRY(const MivDepth range, depthOf(camera, place));
+    const bool numbersTextures = isNumbered(options_.texturePattern),
+               numbersDepths = isNumbered(options_.depthPattern);
+    STX_TRY(view.texture,
+            within(place, sourceOf(texture, forTexture, numbersTextures, frames_, limits_)));
+    STX_TRY(view.depth, within(place, sourceOf(depth, forDepth, numbersDepths, frames_, limits_)));
+    view.distances = distancesOf(range);
+    if (!counted_ && (numbersTextures || numbersDepths)) {
+        const auto there = [&](int number) {
+            Search nextTexture = forTexture, nextDepth = forDepth;
+            nextTexture.frame = nextDepth.frame = number;
+            return !findFile(nextTexture, textures).empty() && !findFile(nextDepth, depths).empty();
+        };
+        const auto& numbered = numbersDepths ? depth : texture;
+        frames_ = std::max(frames_, 1 + lastFrame(folder_, folder_ / numbered, frame, there));
+        counted_ = true;
+    }
+    return true;
+}
+
 }  // namespace
 
 Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& options, Job& job) {
@@ -334,54 +394,13 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
     set.title = title.value_or("");
     STX_TRY(set.origin, originOf(json, where));
     STX_TRY(set.environment, environmentOf(json, folder, where, job.limits));
-    int frames = 0;
-    bool counted = false;  // files with numbers, by those of the first camera that is there
+    MivPictures pictures(folder, options, !sources.empty(), job.limits);
     for (std::size_t i = 0; i < all.size(); ++i) {
         SetView& view = all[i];
         if (!sources.empty() && !sources.contains(view.name)) continue;
-        const Json& camera = json["cameras"][i];
         const std::string place = fmt::format("{}: camera '{}'", where, view.name);
-        const Search forTexture{folder, camera, view, options.frame, "BitDepthColor", "ColorSpace"};
-        const Search forDepth{folder,        camera,          view,
-                              options.frame, "BitDepthDepth", "DepthColorSpace"};
-        const auto patterns = [](const std::string& own, std::vector<std::string> usual) {
-            return own.empty() ? std::move(usual) : std::vector<std::string>{own};
-        };
-        const auto textures = patterns(options.texturePattern, texturePatterns());
-        const auto depths = patterns(options.depthPattern, depthPatterns());
-        const std::string texture = findFile(forTexture, textures);
-        const std::string depth = findFile(forDepth, depths);
-        if (texture.empty() || depth.empty()) {
-            // A list of the sources is a promise; else cameras without images are viewports.
-            if (sources.empty() && options.texturePattern.empty() && options.depthPattern.empty())
-                continue;
-            view.texture.name = texture;
-            view.depth.name = depth;
-            noteMissing(view, options.frame, textures, depths, place);
-            if (!view.exactName.empty()) view.name = view.exactName;
-            set.views.push_back(std::move(view));
-            continue;
-        }
-        STX_TRY(const MivDepth range, depthOf(camera, place));
-        STX_TRY(view.texture,
-                within(place, sourceOf(texture, forTexture, isNumbered(options.texturePattern),
-                                       frames, job.limits)));
-        STX_TRY(view.depth,
-                within(place, sourceOf(depth, forDepth, isNumbered(options.depthPattern), frames,
-                                       job.limits)));
-        view.distances = distancesOf(range);
-        if (!counted && (isNumbered(options.texturePattern) || isNumbered(options.depthPattern))) {
-            const auto there = [&](int frame) {
-                Search nextTexture = forTexture, nextDepth = forDepth;
-                nextTexture.frame = nextDepth.frame = frame;
-                return !findFile(nextTexture, textures).empty() &&
-                       !findFile(nextDepth, depths).empty();
-            };
-            const auto& numbered = isNumbered(options.depthPattern) ? depth : texture;
-            const int count = 1 + lastFrame(folder, folder / numbered, options.frame, there);
-            frames = std::max(frames, count);
-            counted = true;
-        }
+        STX_TRY(const bool isThere, pictures.find(json["cameras"][i], place, view));
+        if (!isThere) continue;
         if (!view.exactName.empty()) view.name = view.exactName;
         set.views.push_back(std::move(view));
     }
@@ -393,7 +412,7 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
         std::ranges::none_of(set.views, [](const SetView& v) { return v.texture.yuv.has_value(); }))
         job.noteUnused({"--yuv"}, "of MIV sets with .yuv files",
                        fmt::format("the pictures of {} are of other kinds", where));
-    set.frames = std::max(frames, 1);
+    set.frames = std::max(pictures.frames(), 1);
     STX_TRY(const auto rate, within(where, findNumber(json, "Fps", "")));
     if (rate && !(*rate > 0))
         return failAt(where, ErrorCode::invalidInput, "'Fps' is {:g}; it must be above 0", *rate);

@@ -315,11 +315,11 @@ Result<StoredView> loadPhoto(const Photo& photo, const PhotoDepth& depth, KeptDe
     return stored;
 }
 
-}  // namespace
-
-Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& options, Job& job) {
+/// The intrinsics that were given, if any. Errors (usage): two that do not agree, or impossible
+/// ones.
+Result<std::optional<PixelIntrinsics>> askedIntrinsics(const path& given,
+                                                       const ImageSetOptions& options) {
     const std::string where = inQuotes(given.string());
-    std::error_code ec;
     if (options.intrinsics[0] != 0 && options.photo.fovRad > 0)
         return failAt(where, ErrorCode::usage,
                       "--intrinsics and --fov both say what its camera is; give one of them");
@@ -329,6 +329,17 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
             where, ErrorCode::usage,
             "the focal lengths of --intrinsics are {:g} and {:g}; two above 0 are expected",
             asked->x, asked->y);
+    return asked;
+}
+
+/// A photo, and the file beside it that has its depth; empty: it has its own.
+struct OpenedPhoto {
+    std::shared_ptr<Photo> photo;
+    path beside;
+};
+Result<OpenedPhoto> openGiven(const path& given, const ImageSetOptions& options, Job& job) {
+    const std::string where = inQuotes(given.string());
+    std::error_code ec;
     if (std::filesystem::is_directory(given, ec))
         return failAt(where, ErrorCode::invalidInput,
                       "a folder; a photograph with depth is one file (many: @LIST)");
@@ -352,7 +363,17 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
         }
     }
     if (!opened) return tl::unexpected(opened.error().at(where));
-    auto photo = std::make_shared<Photo>(std::move(*opened));
+    return OpenedPhoto{std::make_shared<Photo>(std::move(*opened)), std::move(beside)};
+}
+
+}  // namespace
+
+Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& options, Job& job) {
+    const std::string where = inQuotes(given.string());
+    STX_TRY(const auto asked, askedIntrinsics(given, options));
+    STX_TRY(const auto opened, openGiven(given, options, job));
+    const auto& photo = opened.photo;
+    const path& beside = opened.beside;
 
     PhotoDepth depth;
     depth.code = photo->code;

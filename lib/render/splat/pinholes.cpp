@@ -26,51 +26,53 @@ bool isSpeck(const Frame& frame, int x, int y) {
     return true;
 }
 
+struct Closed {
+    int x = 0, y = 0;
+    glm::vec4 colour{0.0f}, albedo{0.0f};
+    glm::vec3 normal{0.0f};
+    float depth = 0;
+};
+
+/// Adds what closes a pixel, if at least `enclosing` of its eight neighbours have a depth.
+void addClosed(const Frame& frame, int x, int y, int enclosing, std::vector<Closed>& out) {
+    int covered = 0;
+    float farthest = 0;
+    for (int j = y - 1; j <= y + 1; ++j) {
+        for (int i = x - 1; i <= x + 1; ++i) {
+            if ((i == x && j == y) || !hasPoint(frame.depth.at(i, j))) continue;
+            ++covered;
+            farthest = std::max(farthest, frame.depth.at(i, j));
+        }
+    }
+    if (covered < enclosing) return;
+    // What opens between two surfaces belongs to the one behind.
+    Closed c{x, y, {}, {}, {}, 0};
+    float n = 0;
+    for (int j = y - 1; j <= y + 1; ++j) {
+        for (int i = x - 1; i <= x + 1; ++i) {
+            const float depth = frame.depth.at(i, j);
+            if ((i == x && j == y) || !hasPoint(depth) || depth < kSameDepth * farthest) continue;
+            n += 1;
+            c.depth += depth;
+            c.colour += frame.colour.at(i, j);
+            if (frame.normal.empty()) continue;
+            c.albedo += frame.albedo.at(i, j);
+            c.normal += frame.normal.at(i, j);
+        }
+    }
+    c.depth /= n;
+    c.colour /= n;
+    c.albedo /= n;
+    if (const float length = glm::length(c.normal); length > 0) c.normal /= length;
+    out.push_back(c);
+}
+
 /// Closes pixels of whose eight neighbours at least `enclosing` have a depth, and specks.
 void closeEnclosed(Frame& frame, int enclosing, const Extent& part) {
-    struct Closed {
-        int x = 0, y = 0;
-        glm::vec4 colour{0.0f}, albedo{0.0f};
-        glm::vec3 normal{0.0f};
-        float depth = 0;
-    };
     constexpr int kRowsPerTask = 32;
     const int width = frame.depth.width(), height = frame.depth.height();
     const int tasks = (part.y1 - part.y0 + kRowsPerTask - 1) / kRowsPerTask;
     std::vector<std::vector<Closed>> closed(tasks);
-    const auto find = [&](int x, int y, std::vector<Closed>& out) {
-        int covered = 0;
-        float farthest = 0;
-        for (int j = y - 1; j <= y + 1; ++j) {
-            for (int i = x - 1; i <= x + 1; ++i) {
-                if ((i == x && j == y) || !hasPoint(frame.depth.at(i, j))) continue;
-                ++covered;
-                farthest = std::max(farthest, frame.depth.at(i, j));
-            }
-        }
-        if (covered < enclosing) return;
-        // What opens between two surfaces belongs to the one behind.
-        Closed c{x, y, {}, {}, {}, 0};
-        float n = 0;
-        for (int j = y - 1; j <= y + 1; ++j) {
-            for (int i = x - 1; i <= x + 1; ++i) {
-                const float depth = frame.depth.at(i, j);
-                if ((i == x && j == y) || !hasPoint(depth) || depth < kSameDepth * farthest)
-                    continue;
-                n += 1;
-                c.depth += depth;
-                c.colour += frame.colour.at(i, j);
-                if (frame.normal.empty()) continue;
-                c.albedo += frame.albedo.at(i, j);
-                c.normal += frame.normal.at(i, j);
-            }
-        }
-        c.depth /= n;
-        c.colour /= n;
-        c.albedo /= n;
-        if (const float length = glm::length(c.normal); length > 0) c.normal /= length;
-        out.push_back(c);
-    };
     parallelFor(0, tasks, [&](std::int64_t t) {
         const int first = part.y0 + static_cast<int>(t) * kRowsPerTask;
         const int from = std::max(1, first);
@@ -91,7 +93,7 @@ void closeEnclosed(Frame& frame, int enclosing, const Extent& part) {
                 for (int x = begin; x < end; ++x) {
                     if (hasPoint(row[x]) ? isSpeck(frame, x, y)
                                          : hasPoint(row[x - 1]) || hasPoint(row[x + 1]))
-                        find(x, y, closed[t]);
+                        addClosed(frame, x, y, enclosing, closed[t]);
                 }
             }
         }
