@@ -209,11 +209,11 @@ class Writer {
             return fail(ErrorCode::invalidInput,
                         "{} is neither JPEG nor PNG and has no objectTypeIndication", what);
         if (out.streamType == StreamType::none && !ownEntry) out.streamType = StreamType::visual;
+        const bool visual = out.streamType == StreamType::visual;
+        if (!visual) out.width = out.height = 0;
         if (out.width < 0 || out.width > 65535 || out.height < 0 || out.height > 65535)
             return fail(ErrorCode::invalidInput, "{} is {}x{} pixels; 65535x65535 are possible",
                         what, out.width, out.height);
-        const bool visual = out.streamType == StreamType::visual;
-        if (!visual) out.width = out.height = 0;
         track.handler = visual ? "vide" : out.streamType == StreamType::audio ? "soun" : "gesm";
         if (ownEntry && out.handler.size() == 4) track.handler = out.handler;
         track.handlerName = visual ? "MPEG-4 image" : "MPEG-4 stream";

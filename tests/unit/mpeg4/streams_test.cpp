@@ -128,6 +128,20 @@ TEST(Streams, AnEntryThatNobodyKnowsPassesThrough) {
     expectStreamsKept(read);
 }
 
+TEST(Streams, WhatIsNoPictureHasNoSize) {
+    Document document = smallScene();
+    ByteWriter png;  // of more pixels than a track can say
+    png.u64(0x89504E470D0A1A0Aull);
+    for (const std::uint32_t value : {13u, 0x49484452u, 2u, 70000u, 0x08020000u}) png.u32(value);
+    ElementaryStream stream;
+    stream.objectTypeIndication = 0x40;
+    stream.streamType = StreamType::audio;
+    stream.samples.resize(1);
+    stream.samples[0].data = ByteRange::of(png.take());
+    descriptorsOf(document).push_back({77, "", {stream}});
+    expectStreamsKept(throughMp4(document));
+}
+
 /// A command that gives object descriptor 10 a stream of these bytes.
 UpdateObjectDescriptors tenOf(std::uint32_t esId, const ByteRange& data) {
     ElementaryStream stream;
