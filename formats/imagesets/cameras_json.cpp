@@ -124,11 +124,12 @@ Result<void> setDepth(const Json& c, const ImageSetOptions& options, const std::
         };
         return {};
     }
-    view.distances = [unit, nearPlane, farPlane, given](Image<float>& values, const Camera& camera,
-                                                        int largest, Job& job) -> Result<void> {
-        if (largest == 0 && given) return depthIsFloats("--depth-unit");
-        if (largest == 0) return {};
-        if (unit) return scaledIntegers(*unit)(values, camera, largest, job);
+    if (unit) {
+        view.distances = orFloats(options, scaledIntegers(*unit));
+        return {};
+    }
+    const auto planes = [nearPlane, farPlane](Image<float>& values, const Camera&, int largest,
+                                              Job&) -> Result<void> {
         const double last = largest - 1;
         for (float& v : values.pixels())
             v = v == 0 ? 0.0f
@@ -136,6 +137,7 @@ Result<void> setDepth(const Json& c, const ImageSetOptions& options, const std::
                                             (1 - (v - 1) / last) * (*farPlane - *nearPlane));
         return {};
     };
+    view.distances = orFloats(options, planes);
     return {};
 }
 

@@ -158,7 +158,7 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
         v.width = size->x;
         v.height = size->y;
         view.camera = cameraFromVision(v);
-        view.distances = sensorIntegers(unitOf(options, kMillimetre));
+        view.distances = sensorsOrFloats(options, kMillimetre);
         view.sensor = true;
         set.views.push_back(std::move(view));
     }

@@ -358,7 +358,7 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
         view.camera = cameraFromVision(v);
         if (depth) view.depthCamera = cameraBeside(v, *depth);
         view.lens = found.lens;
-        view.distances = sensorIntegers(unitOf(options, kMetre));
+        view.distances = sensorsOrFloats(options, kMetre);
         view.sensor = true;
         set.views.push_back(std::move(view));
     }

@@ -108,6 +108,25 @@ TEST(SetOptions, AUnitIsOfAllIntegersInSteps) {
     }
 }
 
+/// Arrays of floats are scene units in recordings, too, whose integers count steps.
+TEST(SetOptions, FloatsOfRecordingsAreDistances) {
+    for (const std::string kind : {"tum", "open3d"}) {
+        SCOPED_TRACE(kind);
+        const TemporaryFolder folder;
+        writeWall(folder, kind);
+        const std::string depth = kind == "tum" ? "depth/1" : "depth/0";
+        std::filesystem::remove(folder / (depth + ".png"));
+        writeExr(folder / (depth + ".exr"), {{"Z", plane(24, 16, [](int, int) { return 2; })}});
+        if (kind == "tum") writeText(folder / "depth.txt", "1 depth/1.exr\n");
+        ImageSetOptions options = optionsOf(kind);
+        const auto read = readSet(folder.path(), options);
+        ASSERT_TRUE(read) << read.error().text();
+        EXPECT_EQ(read->views[0].depth.at(9, 9), 2);
+        options.depthUnit = 0.001;
+        expectError(readSet(folder.path(), options), {depth.c_str(), "--depth-unit", "floats"});
+    }
+}
+
 TEST(SetOptions, AUnitIsNotOfOtherCodes) {
     const TemporaryFolder folder;
     writeWall(folder, "transforms");
