@@ -31,6 +31,29 @@ struct Intrinsics {
     std::string_view whose;  ///< of pictures of 640x480, published; empty: told of these pictures
 };
 
+/// Those of a text file: four numbers, with a lens nine as TUM lists its cameras, or a matrix.
+Result<Intrinsics> intrinsicsIn(const path& file, Job& job) {
+    STX_TRY(const auto n, numbersIn(file, job.limits));
+    if (n.size() == 4) return Intrinsics{{n[0], n[1], n[2], n[3]}, {}, {}};
+    if (n.size() == 9) {
+        const bool lastRow = n[6] == 0 && n[7] == 0 && n[8] == 1;
+        if (lastRow && n[1] == 0 && n[3] == 0) return Intrinsics{{n[0], n[4], n[2], n[5]}, {}, {}};
+        Lens lens;
+        lens.k1 = n[4];
+        lens.k2 = n[5];
+        lens.p1 = n[6];
+        lens.p2 = n[7];
+        lens.k3 = n[8];
+        // A matrix by columns has 0 in the place of fy.
+        if (!lastRow && n[0] != 0 && n[1] != 0)
+            return Intrinsics{{n[0], n[1], n[2], n[3]}, lens, {}};
+    }
+    return failAt(inQuotes(file.string()), ErrorCode::invalidInput,
+                  "{} numbers that are no camera; 'fx fy cx cy', 'fx fy cx cy k1 k2 p1 p2 k3' or "
+                  "the matrix 'fx 0 cx 0 fy cy 0 0 1' is expected, or give --intrinsics",
+                  n.size());
+}
+
 /// Given, else in a file, else those published for the recording.
 Result<Intrinsics> findIntrinsics(const path& folder, bool icl, const ImageSetOptions& options,
                                   const std::string& where, Job& job) {
@@ -38,13 +61,7 @@ Result<Intrinsics> findIntrinsics(const path& folder, bool icl, const ImageSetOp
     if (asked) return Intrinsics{*asked, {}, {}};
     const std::string file = firstThere(folder, {"intrinsics.txt", "calibration.txt", "camera.txt",
                                                  "camera_intrinsics.txt", "camera-intrinsics.txt"});
-    if (!file.empty()) {
-        STX_TRY(const auto n, numbersIn(folder / file, job.limits));
-        if (n.size() == 9) return Intrinsics{{n[0], n[4], n[2], n[5]}, {}, {}};
-        if (n.size() == 4) return Intrinsics{{n[0], n[1], n[2], n[3]}, {}, {}};
-        return failAt(inQuotes((folder / file).string()), ErrorCode::invalidInput,
-                      "{} numbers; 'fx fy cx cy' or a 3x3 matrix is expected", n.size());
-    }
+    if (!file.empty()) return intrinsicsIn(folder / file, job);
     const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
     const auto has = [&](const char* part) { return name.find(part) != std::string::npos; };
     if (icl) return Intrinsics{{481.2, -480.0, 319.5, 239.5}, {}, "ICL-NUIM's published ones"};
