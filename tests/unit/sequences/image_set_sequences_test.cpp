@@ -293,6 +293,25 @@ TEST(MovingSets, TimesThatRoundToOneAreOneMoment) {
     EXPECT_EQ(sequence->timeline().count(), 2u);
 }
 
+/// 0.1 * 3 and 0.3 are one moment, of which two cameras have a picture each.
+TEST(MovingSets, TimesThatDifferInTheirLastBitAreOneMoment) {
+    for (const bool named : {false, true}) {
+        TemporaryFolder folder;
+        std::vector<Shot> shots;
+        for (int i = 1; i < 5; ++i) {
+            shots.push_back({named ? "a" : "", 0.1 * i, 0.01 * i, 2 * i});
+            shots.push_back({named ? "b" : "", i / 10.0, 5 + 0.01 * i, 2 * i + 1});
+        }
+        const auto sequence = opened(writeShots(folder, shots));
+        ASSERT_TRUE(sequence);
+        ASSERT_EQ(sequence->timeline().count(), 4u);
+        for (std::size_t k = 0; k < 4; ++k) {
+            EXPECT_NEAR(depthOf(*sequence, k, 0), 1.002 + 0.002 * k, 1e-4);
+            EXPECT_NEAR(depthOf(*sequence, k, 1), 1.003 + 0.002 * k, 1e-4);
+        }
+    }
+}
+
 TEST(MovingSets, PicturesOfOnePoseAreOneCamera) {
     TemporaryFolder folder;
     const auto set =
@@ -370,6 +389,9 @@ TEST(MovingSets, BrokenTimesAreErrors) {
     };
     EXPECT_NE(messageOf({{"a", 0, 0, 0}, {"a", 1, 0, 0}, {"a", 1, 0, 0}})
                   .find("are both of camera 'a' at 1 s"),
+              std::string::npos);
+    EXPECT_NE(messageOf({{"a", 0, 0, 0}, {"a", 0.3, 0, 0}, {"a", 0.1 * 3, 0, 0}})
+                  .find("are both of camera 'a' at 0.3 s"),
               std::string::npos);
     EXPECT_NE(messageOf({{"a", 0, 0, 0}, {"a", 1, 0, 0}}, "\"time\":1,", "")
                   .find("1 of 2 pictures have a 'time'"),
