@@ -342,7 +342,10 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
     for (const Frame& frame : frames) {
         SetView view;
         view.name = path(frame.texture).stem().string();
-        if (timed) view.time = frame.time;
+        if (timed) {
+            view.time = frame.time;
+            view.taker = "camera";  // one, even where it rests
+        }
         STX_CHECK(findPictures(folder, frame.texture, frame.depth, where, job.limits, view));
         if (view.missing) {
             set.views.push_back(std::move(view));

@@ -335,6 +335,37 @@ TEST(MovingSets, WhereNoPoseComesTwiceOneCameraMoves) {
     EXPECT_DOUBLE_EQ(last->views[0].camera.position.x, 7);
 }
 
+TEST(MovingSets, ARecordingIsOfOneCameraEvenWhereItRests) {
+    TemporaryFolder folder;
+    std::string pictures, poses;
+    const double x[] = {0, 0, 0.01, 0.02};
+    for (int i = 0; i < 4; ++i) {
+        const std::vector<std::uint8_t> rgb(8 * 6 * 3, 90);
+        const std::vector<std::uint16_t> depth(8 * 6, static_cast<std::uint16_t>(5000 * (1 + i)));
+        writeBytes(folder / fmt::format("c{}.png", i), *encodePng(8, 6, 3, 8, rgb.data(), true));
+        writeBytes(folder / fmt::format("d{}.png", i),
+                   *encodePng(8, 6, 1, 16, depth.data(), false));
+        pictures += fmt::format("{0} c{1}.png {0} d{1}.png\n", 1 + 0.1 * i, i);
+        poses += fmt::format("{} {} 0 0 0 0 0 1\n", 1 + 0.1 * i, x[i]);
+    }
+    writeText(folder / "associations.txt", pictures);
+    writeText(folder / "groundtruth.txt", poses);
+    writeText(folder / "intrinsics.txt", "8 8 3.5 2.5\n");
+    ImageSetOptions options;
+    options.moving = true;
+    const auto sequence = opened(folder.path(), options);
+    ASSERT_TRUE(sequence);
+    ASSERT_EQ(sequence->timeline().count(), 4u);
+    Job job;
+    for (std::size_t k = 0; k < 4; ++k) {
+        const auto frame = sequence->frame(k, job);
+        ASSERT_TRUE(frame) << frame.error().text();
+        ASSERT_EQ(frame->views.size(), 1u);
+        EXPECT_DOUBLE_EQ(frame->views[0].camera.position.x, x[k]);
+        EXPECT_NEAR(frame->views[0].depth.at(3, 3), 1.0 + k, 1e-4);
+    }
+}
+
 TEST(MovingSets, StillTakesAllPicturesAsViews) {
     TemporaryFolder folder;
     const auto set = writeShots(folder, {{"", 0, 0, 1}, {"", 1, 5, 2}, {"", 2, 7, 3}});
