@@ -66,6 +66,7 @@ Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& wher
             STX_TRY(const auto value, findNumber(c, key, where));
             *to = value.value_or(0);
         }
+        view.lens.skew /= camera.fx;
     }
     STX_TRY(const auto p, needNumbers(c, "position", 3, where));
     camera.position = {p[0], p[1], p[2]};

@@ -9,12 +9,12 @@ namespace stx::imagesets {
 /// What a real camera does to an ideal pinhole's picture. Coordinates as in OpenCV and COLMAP: x
 /// right, y down, of the plane at distance 1:
 /// x' = x (1 + k1 r2 + k2 r4 + k3 r6) + 2 p1 x y + p2 (r2 + 2 x x), y' alike; then the image point
-/// is (fx x' + skew y' + cx, fy y' + cy). SIMPLE_RADIAL: k1; RADIAL: k1 k2; OPENCV: k1 k2 p1 p2.
+/// is (fx (x' + skew y') + cx, fy y' + cy). SIMPLE_RADIAL: k1; RADIAL: k1 k2; OPENCV: k1 k2 p1 p2.
 /// With `rational` (FULL_OPENCV, Azure Kinect) the radial factor is divided by 1 + k4 r2 + k5 r4 +
 /// k6 r6.
 struct Lens {
     double k1 = 0, k2 = 0, k3 = 0, p1 = 0, p2 = 0;
-    double skew = 0;  ///< pixels
+    double skew = 0;  ///< pixels / fx: pictures of all sizes have the same
     /// OPENCV_FISHEYE instead: t = atan r, x' = x / r * t (1 + k1 t2 + k2 t4 + k3 t6 + k4 t8);
     /// p1 and p2 are not used.
     bool fisheye = false;

@@ -224,31 +224,43 @@ TEST(ColmapTraps, EachLensModelIsUndoneToAThousandthOfAPixel) {
 }
 
 TEST(CamerasTraps, SkewIsRemovedAndItsSizeTold) {
-    TemporaryFolder folder;
-    writePositions(folder / "t.exr", 96, 64);
-    writeCodes(folder / "d.png", 96, 64, 16, [](int, int) { return 2000; });
-    writeText(folder / "cameras.json",
-              "{\"cameras\":[{\"texture\":\"t.exr\",\"depth\":\"d.png\",\"width\":96,\"height\":64,"
-              "\"position\":[0,0,0],\"quaternion\":[0,0,0,1],\"fx\":80,\"fy\":82,\"cx\":50,"
-              "\"cy\":30,\"depthUnit\":0.001,\"skew\":2.5}]}");
-    Job job;
-    const auto read = readImageSet(folder.path(), {}, job);
-    ASSERT_TRUE(read) << read.error().text();
-    const auto notes = job.takeNotes();
-    ASSERT_FALSE(notes.empty());
-    // Largest at the lower edge: 2.5 * (64 - 30) / 82.
-    EXPECT_NE(notes[0].find("skew of up to 1.04 pixels"), std::string::npos) << notes[0];
-    int checked = 0;
-    for (int y = 0; y < 64; ++y)
-        for (int x = 0; x < 96; ++x) {
-            if (read->views[0].texture.at(x, y).a < 1) continue;
-            const double at = x + 0.5 + 2.5 * (y + 0.5 - 30) / 82;
-            if (at < 2 || at > 94) continue;
-            ASSERT_NEAR(read->views[0].texture.at(x, y).x, at, 1e-3);
-            ASSERT_NEAR(read->views[0].texture.at(x, y).y, y + 0.5, 1e-3);
-            ++checked;
-        }
-    EXPECT_GT(checked, 5000);
+    // The picture as it is, and half as large, as its depth is.
+    for (const int shrunk : {1, 2}) {
+        SCOPED_TRACE(shrunk);
+        const int w = 96 / shrunk, h = 64 / shrunk;
+        TemporaryFolder folder;
+        writePositions(folder / "t.exr", 96, 64);
+        writeCodes(folder / "d.png", w, h, 16, [](int, int) { return 2000; });
+        writeText(
+            folder / "cameras.json",
+            "{\"cameras\":[{\"texture\":\"t.exr\",\"depth\":\"d.png\",\"width\":96,\"height\":64,"
+            "\"position\":[0,0,0],\"quaternion\":[0,0,0,1],\"fx\":80,\"fy\":82,\"cx\":50,"
+            "\"cy\":30,\"depthUnit\":0.001,\"skew\":2.5}]}");
+        ImageSetOptions options;
+        options.refine.set(RefineStep::raise, false);
+        Job job;
+        const auto read = readImageSet(folder.path(), options, job);
+        ASSERT_TRUE(read) << read.error().text();
+        std::string notes;
+        for (const std::string& note : job.takeNotes()) notes += note + "\n";
+        // Largest at the lower edge: 2.5 * (64 - 30) / 82.
+        EXPECT_NE(notes.find(shrunk == 1 ? "skew of up to 1.04 pixels" : "skew of up to 0.52"),
+                  std::string::npos)
+            << notes;
+        int checked = 0;
+        for (int y = 0; y < h; ++y)
+            for (int x = 0; x < w; ++x) {
+                const glm::vec4 colour = read->views[0].texture.at(x, y);
+                if (colour.a < 1) continue;
+                const glm::dvec2 p(shrunk * (x + 0.5), shrunk * (y + 0.5));
+                const double at = p.x + 2.5 * (p.y - 30) / 82;
+                if (at < 4 || at > 92 || p.y < 4 || p.y > 60) continue;
+                ASSERT_NEAR(colour.x, at, 1e-3);
+                ASSERT_NEAR(colour.y, p.y, 1e-3);
+                ++checked;
+            }
+        EXPECT_GT(checked, 4500 / shrunk / shrunk);
+    }
 }
 
 TEST(MivTraps, FarOfAThousandIsInfinity) {
