@@ -77,4 +77,23 @@ bool Lens::invertible(const Camera& c) const {
     return fine;
 }
 
+double Focal::of(int side) const {
+    return pixels ? *pixels : side * 0.5 / std::tan(*angle * 0.5);
+}
+
+void Pinhole::fill(Camera& camera) const {
+    if (x.said()) camera.fx = camera.fy = x.of(camera.width);
+    if (y.said()) camera.fy = y.of(camera.height);
+    camera.cx = cx.value_or(camera.width * 0.5);
+    camera.cy = cy.value_or(camera.height * 0.5);
+}
+
+std::optional<glm::ivec2> Pinhole::sizeAround() const {
+    if (!cx || !cy) return std::nullopt;
+    const glm::dvec2 size = glm::round(glm::dvec2(*cx, *cy) * 2.0);
+    constexpr double kMost = 65535;
+    if (!(size.x >= 1 && size.y >= 1 && size.x <= kMost && size.y <= kMost)) return std::nullopt;
+    return glm::ivec2(size);
+}
+
 }  // namespace stx::imagesets

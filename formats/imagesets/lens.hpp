@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include <glm/glm.hpp>
 
 #include "lib/geometry/camera.hpp"
@@ -35,6 +37,27 @@ struct Lens {
     [[nodiscard]] double cutShare(const Camera& camera) const;
     /// The mapping does not fold inside the picture: it can be undone.
     [[nodiscard]] bool invertible(const Camera& camera) const;
+};
+
+/// A focal length along one axis as a file says it, in pixels or as an angle of view in radians.
+struct Focal {
+    std::optional<double> pixels, angle;
+
+    [[nodiscard]] bool said() const { return pixels || angle; }
+    /// Of a picture of that side; said() must be true.
+    [[nodiscard]] double of(int side) const;
+};
+
+/// What a file says of a pinhole: what it leaves out follows from the size of the picture.
+struct Pinhole {
+    Focal x, y;                    ///< y not said: square pixels
+    std::optional<double> cx, cy;  ///< not said: the middle
+
+    /// Fills in the camera's intrinsics by its size.
+    void fill(Camera& camera) const;
+    /// The size in whose middle the principal point is; nothing: it is not said, or no picture has
+    /// that size.
+    [[nodiscard]] std::optional<glm::ivec2> sizeAround() const;
 };
 
 }  // namespace stx::imagesets

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "formats/imagesets/camera_file.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
 using namespace stx;
@@ -63,6 +64,58 @@ TEST(TransformsTraps, AnglesAndIntrinsicsOfAFrameOfItsOwn) {
     EXPECT_EQ(a.cx, 48);
     EXPECT_EQ(a.cy, 32);
     EXPECT_EQ(glm::dvec4(b.fx, b.fy, b.cx, b.cy), glm::dvec4(70, 71, 40, 30));
+}
+
+TEST(TransformsTraps, AnglesHavePrincipalPointsToo) {
+    TemporaryFolder folder;
+    writeColour(folder / "a.png", roomViews(1)[0]);
+    writeCodes(folder / "d.png", 96, 64, 16, [](int, int) { return 2000; });
+    const std::string frame = transformsFrame(glm::dmat4(1), ",\"depth_file_path\":\"d.png\"");
+    writeText(folder / "transforms.json",
+              "{\"camera_angle_x\":0.8,\"fl_y\":90,\"cx\":30,\"cy\":40.5,\"frames\":[" + frame +
+                  "]}");
+    const auto read = readSet(folder.path());
+    ASSERT_TRUE(read) << read.error().text();
+    const Camera& c = read->views[0].camera;
+    EXPECT_NEAR(c.fx, 48 / std::tan(0.4), 1e-9);
+    EXPECT_EQ(glm::dvec3(c.fy, c.cx, c.cy), glm::dvec3(90, 30, 40.5));
+    // Without pictures the principal point is taken for the middle.
+    Job job;
+    const auto cameras = readCameraFile(folder / "transforms.json", job);
+    ASSERT_TRUE(cameras) << cameras.error().text();
+    const Camera& alone = cameras->at(0).camera;
+    EXPECT_EQ(glm::ivec2(alone.width, alone.height), glm::ivec2(60, 81));
+    EXPECT_NEAR(alone.fx, 30 / std::tan(0.4), 1e-9);
+    EXPECT_EQ(glm::dvec3(alone.fy, alone.cx, alone.cy), glm::dvec3(90, 30, 40.5));
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("size; 60x81 is used"), std::string::npos) << notes[0];
+}
+
+TEST(TransformsTraps, AFramesOwnFocalLengthComesBeforeTheFiles) {
+    TemporaryFolder folder;
+    writeColour(folder / "a.png", roomViews(1)[0]);
+    writeCodes(folder / "d.png", 96, 64, 16, [](int, int) { return 2000; });
+    const auto camerasOf = [&](const std::string& file, const std::string& frame) {
+        writeText(folder / "transforms.json",
+                  "{\"w\":96,\"h\":64," + file + "\"frames\":[" +
+                      transformsFrame(glm::dmat4(1), ",\"depth_file_path\":\"d.png\"" + frame) +
+                      "]}");
+        const auto read = readSet(folder.path());
+        EXPECT_TRUE(read) << read.error().text();
+        return read ? glm::dvec2(read->views[0].camera.fx, read->views[0].camera.fy)
+                    : glm::dvec2(0);
+    };
+    const double fx = 48 / std::tan(0.4);
+    const std::string both = "\"fl_x\":70,\"fl_y\":71,";
+    const glm::dvec2 square = camerasOf(both, ",\"camera_angle_x\":0.8");
+    EXPECT_NEAR(square.x, fx, 1e-9);
+    EXPECT_NEAR(square.y, fx, 1e-9);
+    const glm::dvec2 upright = camerasOf(both, ",\"camera_angle_y\":0.8");
+    EXPECT_EQ(upright.x, 70);
+    EXPECT_NEAR(upright.y, 32 / std::tan(0.4), 1e-9);
+    EXPECT_EQ(camerasOf(both, ",\"fl_x\":80,\"camera_angle_x\":0.8"), glm::dvec2(80, 80));
+    EXPECT_EQ(camerasOf("\"fl_y\":71,", ",\"fl_x\":80"), glm::dvec2(80, 71));
 }
 
 TEST(TransformsTraps, RotationThatIsNotQuiteOneIsRepairedAndItsSizeTold) {
