@@ -66,7 +66,8 @@ enum class JsonKind { transforms, miv, cameras, cameraPath, none };
 /// Takes poses out of the world that nerfstudio trains and shows in, with what its
 /// dataparser_transforms.json says: normalised = scale * transform * world. The world is that of
 /// the images before nerfstudio prepared them (COLMAP's), or that of their transforms.json, where
-/// one is given that names the difference (applied_transform, applied_scale).
+/// one is given that names the difference (applied_transform, applied_scale), which is part of the
+/// transform and of the scale.
 [[nodiscard]] Result<void> undoDataparser(const Json& dataparser, const Json* transforms,
                                           std::vector<SetView>& views, Job& job);
 /// Those of a COLMAP model (its folder, the workspace, or one of its files), by their names.

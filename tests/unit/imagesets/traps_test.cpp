@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "formats/imagesets/camera_file.hpp"
+#include "formats/imagesets/kinds.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
 using namespace stx;
@@ -71,9 +72,9 @@ TEST(TransformsTraps, AnglesHavePrincipalPointsToo) {
     writeColour(folder / "a.png", roomViews(1)[0]);
     writeCodes(folder / "d.png", 96, 64, 16, [](int, int) { return 2000; });
     const std::string frame = transformsFrame(glm::dmat4(1), ",\"depth_file_path\":\"d.png\"");
-    writeText(folder / "transforms.json",
-              "{\"camera_angle_x\":0.8,\"fl_y\":90,\"cx\":30,\"cy\":40.5,\"frames\":[" + frame +
-                  "]}");
+    writeText(
+        folder / "transforms.json",
+        "{\"camera_angle_x\":0.8,\"fl_y\":90,\"cx\":30,\"cy\":40.5,\"frames\":[" + frame + "]}");
     const auto read = readSet(folder.path());
     ASSERT_TRUE(read) << read.error().text();
     const Camera& c = read->views[0].camera;
@@ -116,6 +117,35 @@ TEST(TransformsTraps, AFramesOwnFocalLengthComesBeforeTheFiles) {
     EXPECT_NEAR(upright.y, 32 / std::tan(0.4), 1e-9);
     EXPECT_EQ(camerasOf(both, ",\"fl_x\":80,\"camera_angle_x\":0.8"), glm::dvec2(80, 80));
     EXPECT_EQ(camerasOf("\"fl_y\":71,", ",\"fl_x\":80"), glm::dvec2(80, 71));
+}
+
+/// As at the end of nerfstudio's _generate_dataparser_outputs(): poses are s * T * p, and written
+/// are T * A and s * a, with A and a of the transforms.json.
+TEST(TransformsTraps, NerfstudiosScaleHoldsTheAppliedOne) {
+    const glm::dvec3 p(1, 2, 3), t(0.5, -2, 3), shift(7, 0, -1);
+    const double s = 0.25, a = 4;
+    imagesets::SetView view;
+    view.camera = Camera::fromFieldOfView(s * (p + t), {1, 0, 0, 0}, {1, 0.8}, false, 16, 12);
+    const auto matrix = [](const glm::dvec3& move) {
+        glm::dmat4 m(1);
+        m[3] = glm::dvec4(move, 1);
+        return imagesets::Json::parse(rowsOf(m));
+    };
+    const imagesets::Json dataparser = {{"transform", matrix(t + shift)}, {"scale", s * a}};
+    imagesets::Json transforms = {{"applied_transform", matrix(shift)}, {"applied_scale", a}};
+    Job job;
+    std::vector<imagesets::SetView> views{view};
+    ASSERT_TRUE(imagesets::undoDataparser(dataparser, &transforms, views, job));
+    EXPECT_LT(glm::length(views[0].camera.position - p), 1e-12);
+    transforms.erase("applied_transform");
+    views = {view};
+    const imagesets::Json unmoved = {{"transform", matrix(t)}, {"scale", s * a}};
+    ASSERT_TRUE(imagesets::undoDataparser(unmoved, &transforms, views, job));
+    EXPECT_LT(glm::length(views[0].camera.position - p), 1e-12);
+    transforms["applied_scale"] = 0;
+    const auto wrong = imagesets::undoDataparser(dataparser, &transforms, views, job);
+    ASSERT_FALSE(wrong);
+    EXPECT_EQ(wrong.error().text(), "transforms.json: 'applied_scale' is 0; it must be above 0");
 }
 
 TEST(TransformsTraps, RotationThatIsNotQuiteOneIsRepairedAndItsSizeTold) {
