@@ -13,6 +13,7 @@ Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& wher
     SetView view;
     STX_TRY(const auto name, findText(c, "name", where));
     view.name = name.value_or(fmt::format("view{:03}", index));
+    STX_TRY(view.time, findNumber(c, "time", where));
     Camera& camera = view.camera;
     STX_TRY(const double width, needNumber(c, "width", where));
     STX_TRY(const double height, needNumber(c, "height", where));
@@ -91,10 +92,18 @@ Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& wher
     return view;
 }
 
-/// `depthUnit`: integers times that are distances, 0 is none (default: millimetres). `nearPlane`
-/// and `farPlane`: the code of DepthImage.
-Result<void> setDepth(const Json& c, const ImageSetOptions& options, const std::string& where,
-                      SetView& view) {
+/// Of depth of which nothing is said.
+Result<void> floatsOnly(Image<float>&, const Camera&, int largest, Job&) {
+    if (largest == 0) return {};
+    return fail(ErrorCode::invalidInput,
+                "the depth is stored as integers; 'depthUnit', or 'nearPlane' and 'farPlane', must "
+                "tell what they mean");
+}
+
+}  // namespace
+
+Result<std::optional<Distances>> camerasDistances(const Json& c, const ImageSetOptions& options,
+                                                  const std::string& where) {
     STX_TRY(auto unit, findNumber(c, "depthUnit", where));
     STX_TRY(const auto nearPlane, findNumber(c, "nearPlane", where));
     STX_TRY(const auto farPlane, findNumber(c, "farPlane", where));
@@ -116,33 +125,17 @@ Result<void> setDepth(const Json& c, const ImageSetOptions& options, const std::
                       "its depth is not in steps of a distance, as 'nearPlane' says; leave out "
                       "--depth-unit");
     if (given) unit = options.depthUnit;
-    if (!nearPlane && !unit) {
-        view.distances = [](Image<float>&, const Camera&, int largest, Job&) -> Result<void> {
-            if (largest == 0) return {};
-            return fail(ErrorCode::invalidInput,
-                        "the depth is stored as integers; 'depthUnit', or 'nearPlane' and "
-                        "'farPlane', must tell what they mean");
-        };
-        return {};
-    }
-    if (unit) {
-        view.distances = orFloats(options, scaledIntegers(*unit));
-        return {};
-    }
-    const auto planes = [nearPlane, farPlane](Image<float>& values, const Camera&, int largest,
-                                              Job&) -> Result<void> {
+    if (unit) return orFloats(options, scaledIntegers(*unit));
+    if (!nearPlane) return std::nullopt;
+    const auto planes = [from = *nearPlane, to = *farPlane](Image<float>& values, const Camera&,
+                                                            int largest, Job&) -> Result<void> {
         const double last = largest - 1;
         for (float& v : values.pixels())
-            v = v == 0 ? 0.0f
-                       : static_cast<float>(*nearPlane +
-                                            (1 - (v - 1) / last) * (*farPlane - *nearPlane));
+            v = v == 0 ? 0.0f : static_cast<float>(from + (1 - (v - 1) / last) * (to - from));
         return {};
     };
-    view.distances = orFloats(options, planes);
-    return {};
+    return orFloats(options, planes);
 }
-
-}  // namespace
 
 Result<std::vector<SetView>> camerasJsonViews(const Json& file, Job& job) {
     const Json& cameras = file["cameras"];
@@ -181,7 +174,9 @@ Result<SetDescription> describeCamerasJson(const path& given, const ImageSetOpti
         STX_TRY(view.texture, sourceInside(folder, texture, place, job.limits));
         STX_TRY(const std::string depth, needText(c, "depth", place));
         STX_TRY(view.depth, sourceInside(folder, depth, place, job.limits));
-        STX_CHECK(setDepth(c, options, place, view));
+        STX_TRY(const auto told, camerasDistances(c, options, place));
+        view.distances = told ? *told : Distances(floatsOnly);
+        view.time.reset();  // it is of one moment
     }
     return set;
 }

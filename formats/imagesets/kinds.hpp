@@ -45,6 +45,11 @@ using std::filesystem::path;
                                                                    const std::string& where);
 /// Of a camera of MIV's list.
 [[nodiscard]] Result<Distances> mivDistances(const Json& camera, const std::string& where);
+/// Of a camera of our cameras.json. `depthUnit`: integers times that are distances, 0 is none;
+/// `nearPlane` and `farPlane`: the code of DepthImage; neither: nothing.
+[[nodiscard]] Result<std::optional<Distances>> camerasDistances(const Json& camera,
+                                                                const ImageSetOptions& options,
+                                                                const std::string& where);
 
 /// The file in `folder` with the poses of Open3D's or Redwood's recordings; empty: none.
 [[nodiscard]] std::string trajectoryLogIn(const path& folder);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/imagesets/camera_file.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
 using namespace stx;
@@ -201,6 +202,30 @@ TEST(CamerasJson, DepthImageCodesComeBackAndUnlikeSizesAreResampled) {
     expectError(readSet(folder.path()), {"d.png", "depthUnit"});
     json(",\"nearPlane\":40,\"farPlane\":0.1");
     expectError(readSet(folder.path()), {"cameras[0]", "nearPlane"});
+}
+
+/// Times of its poses are for films and paths of cameras.
+TEST(CamerasJson, IsOfOneMomentWhateverItsTimes) {
+    const auto views = roomViews(2, 24, 16);
+    TemporaryFolder folder;
+    std::string cameras;
+    for (int i = 0; i < 2; ++i) {
+        writeColour(folder / fmt::format("t{}.png", i), views[i]);
+        writeCodes(folder / fmt::format("d{}.png", i), 24, 16, 16, [](int, int) { return 2000; });
+        cameras += fmt::format(R"({}{{"texture":"t{}.png","depth":"d{}.png","width":24,"height":16,)"
+                               R"("position":[{},0,0],"orientation":[0,1,0,0],"fx":20,"time":{},)"
+                               R"("depthUnit":0.001}})",
+                               i ? "," : "", i, i, i, 0.5 * i);
+    }
+    writeText(folder / "cameras.json", "{\"cameras\":[" + cameras + "]}");
+    Job job;
+    const auto set = openImageSet(folder.path(), {}, job);
+    ASSERT_TRUE(set) << set.error().text();
+    EXPECT_FALSE((*set)->timeline().moves());
+    EXPECT_EQ((*set)->frame(0, job)->views.size(), 2u);
+    const auto named = readCameraFile(folder / "cameras.json", job);
+    ASSERT_TRUE(named) << named.error().text();
+    EXPECT_EQ(named->at(1).time, 0.5);
 }
 
 TEST(ExrSet, PartsOfTheirOwnAndDataWindowsAndCamerasFromAttributes) {
