@@ -9,6 +9,29 @@
 namespace stx::imagesets {
 namespace {
 
+Result<void> setPose(const Json& c, const std::string& where, Camera& camera) {
+    STX_TRY(const auto p, needNumbers(c, "position", 3, where));
+    camera.position = {p[0], p[1], p[2]};
+    STX_TRY(const auto axisAngle, findNumbers(c, "orientation", 4, where));
+    STX_TRY(const auto quaternion, findNumbers(c, "quaternion", 4, where));
+    if (quaternion) {
+        const auto& q = *quaternion;
+        if (auto r = rotationFromQuaternion({q[0], q[1], q[2], q[3]}, where); !r)
+            return propagate(r);
+        camera.orientation = glm::normalize(glm::dquat(q[3], q[0], q[1], q[2]));
+    } else if (axisAngle) {
+        const auto& a = *axisAngle;
+        if (!(glm::length(glm::dvec3(a[0], a[1], a[2])) > 1e-9) && a[3] != 0)
+            return failAt(where, ErrorCode::invalidInput, "the axis of 'orientation' is zero");
+        camera.orientation = quatFromAxisAngle({a[0], a[1], a[2], a[3]});
+    } else {
+        return failAt(where, ErrorCode::invalidInput,
+                      "neither 'orientation' (axis x y z, angle) nor 'quaternion' (x y z w) is "
+                      "given");
+    }
+    return {};
+}
+
 Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& where) {
     SetView view;
     STX_TRY(const auto name, findText(c, "name", where));
@@ -69,25 +92,7 @@ Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& wher
         }
         view.lens.skew /= camera.fx;
     }
-    STX_TRY(const auto p, needNumbers(c, "position", 3, where));
-    camera.position = {p[0], p[1], p[2]};
-    STX_TRY(const auto axisAngle, findNumbers(c, "orientation", 4, where));
-    STX_TRY(const auto quaternion, findNumbers(c, "quaternion", 4, where));
-    if (quaternion) {
-        const auto& q = *quaternion;
-        if (auto r = rotationFromQuaternion({q[0], q[1], q[2], q[3]}, where); !r)
-            return propagate(r);
-        camera.orientation = glm::normalize(glm::dquat(q[3], q[0], q[1], q[2]));
-    } else if (axisAngle) {
-        const auto& a = *axisAngle;
-        if (!(glm::length(glm::dvec3(a[0], a[1], a[2])) > 1e-9) && a[3] != 0)
-            return failAt(where, ErrorCode::invalidInput, "the axis of 'orientation' is zero");
-        camera.orientation = quatFromAxisAngle({a[0], a[1], a[2], a[3]});
-    } else {
-        return failAt(where, ErrorCode::invalidInput,
-                      "neither 'orientation' (axis x y z, angle) nor 'quaternion' (x y z w) is "
-                      "given");
-    }
+    STX_CHECK(setPose(c, where, camera));
     if (auto ok = camera.check(); !ok) return tl::unexpected(ok.error().at(where));
     return view;
 }

@@ -165,6 +165,16 @@ Result<std::vector<TimedPose>> readTrajectory(const path& folder, const std::str
     return poses;
 }
 
+/// The file in the folder with its poses; empty: there is none.
+std::string trajectoryIn(const path& folder) {
+    std::string found = firstThere(folder, {"groundtruth.txt", "pose.txt", "poses.txt",
+                                            "trajectory.txt", "CameraTrajectory.txt"});
+    if (found.empty())
+        for (const std::string& name : filesIn(folder))
+            if (name.ends_with(".gt.freiburg")) found = name;
+    return found;
+}
+
 /// Files named by a number (`17.png`), by that number.
 std::vector<std::pair<int, std::string>> numbered(const path& folder, const std::string& under) {
     std::vector<std::pair<int, std::string>> out;
@@ -305,13 +315,7 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
     const bool isFolder = std::filesystem::is_directory(given, ec);
     const path folder = isFolder ? given : folderOf(given);
     const std::string where = inQuotes(given.string());
-    std::string trajectory = isFolder ? "" : given.filename().string();
-    if (trajectory.empty())
-        trajectory = firstThere(folder, {"groundtruth.txt", "pose.txt", "poses.txt",
-                                         "trajectory.txt", "CameraTrajectory.txt"});
-    if (trajectory.empty())
-        for (const std::string& name : filesIn(folder))
-            if (name.ends_with(".gt.freiburg")) trajectory = name;
+    const std::string trajectory = isFolder ? trajectoryIn(folder) : given.filename().string();
     if (trajectory.empty())
         return failAt(where, ErrorCode::io,
                       "no trajectory was found in it; groundtruth.txt, pose.txt, trajectory.txt or "
