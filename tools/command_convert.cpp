@@ -468,9 +468,8 @@ void addSetFiles(Command& c, const std::shared_ptr<ConvertOptions>& o) {
         .reads("PATTERN");
     c.option("--mask", set.maskPattern,
              "Names of pictures that are white where the object is, {stem} of the colour picture's "
-             "file or {name} in them, beside the set or in the current folder; 'stx background "
-             "--mask-of "
-             "all' makes such masks")
+             "file, {name} or (MIV, MSR) {frame} in them, beside the set or in the current folder; "
+             "'stx background --mask-of all' makes such masks")
         .reads("PATTERN");
     c.choice<std::optional<NoDepth>>(
         "--no-depth", set.noDepth,

@@ -17,7 +17,7 @@ Result<std::vector<NamedCamera>> camerasOf(const std::vector<imagesets::SetView>
     if (views.empty())
         return failAt(where, ErrorCode::invalidInput, "it has no camera; at least one is expected");
     std::vector<NamedCamera> out;
-    bool sizeMissing = false;
+    std::optional<glm::ivec2> assumed;
     int lenses = 0;
     for (const SetView& view : views) {
         if (!view.lens.ideal()) ++lenses;
@@ -26,24 +26,18 @@ Result<std::vector<NamedCamera>> camerasOf(const std::vector<imagesets::SetView>
                           "camera '{}' is equirectangular; only perspective and orthographic "
                           "cameras can be used here",
                           view.name);
-        Camera camera = view.camera;
-        if (camera.width == 0) {
-            // Blender's files have an angle only, the size is that of the images.
-            const glm::ivec2 used = size.value_or(glm::ivec2(512));
-            camera.width = used.x;
-            camera.height = used.y;
-            camera.cx = used.x * 0.5;
-            camera.cy = used.y * 0.5;
-            camera.fx = camera.cx / std::tan(view.angleX * 0.5);
-            camera.fy = view.angleY > 0 ? camera.cy / std::tan(view.angleY * 0.5) : camera.fx;
-            sizeMissing = true;
-        }
+        // Blender's files have an angle only, the size is that of the images. A principal point is
+        // near their middle.
+        const glm::ivec2 used = size ? *size : view.told.sizeAround().value_or(glm::ivec2(512));
+        const Camera camera = view.cameraOf(used);
+        if (view.camera.width == 0 && !size) assumed = used;
         if (auto ok = camera.check(); !ok)
             return tl::unexpected(ok.error().at(fmt::format("camera '{}'", view.name)).at(where));
         out.push_back({view.name, camera, view.time, view.refined.moved.has_value()});
     }
-    if (sizeMissing && !size)
-        job.note(fmt::format("{} does not tell the images' size; 512x512 is used", where));
+    if (assumed)
+        job.note(fmt::format("{} does not tell the images' size; {}x{} is used", where, assumed->x,
+                             assumed->y));
     if (lenses > 0)
         job.note(fmt::format("{}: pictures are drawn without the lens distortion of {}", where,
                              counted(lenses, "camera")));

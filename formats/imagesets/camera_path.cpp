@@ -10,37 +10,39 @@
 namespace stx::imagesets {
 namespace {
 
-/// p -> scale * (rotation * p + shift)
-struct Similarity {
+/// p -> rotation * p + shift
+struct RigidMotion {
     glm::dmat3 rotation{1.0};
     glm::dvec3 shift{0.0};
-    double scale = 1;
 
     void undo(Camera& c) const {
-        c.position = glm::transpose(rotation) * (c.position / scale - shift);
+        c.position = glm::transpose(rotation) * (c.position - shift);
         c.orientation = glm::normalize(glm::quat_cast(glm::transpose(rotation)) * c.orientation);
     }
     void apply(Camera& c) const {
-        c.position = scale * (rotation * c.position + shift);
+        c.position = rotation * c.position + shift;
         c.orientation = glm::normalize(glm::quat_cast(rotation) * c.orientation);
     }
 };
 
-/// Of a matrix and a factor, which is 1 where there is none.
-Result<Similarity> similarityOf(const Json& file, const char* matrixKey, const char* scaleKey,
-                                const std::string& where, Job& job) {
-    Similarity out;
-    STX_TRY(const glm::dmat4 matrix, needMatrix(file, matrixKey, where));
+Result<RigidMotion> rigidMotionOf(const Json& file, const char* key, const std::string& where,
+                                  Job& job) {
+    STX_TRY(const glm::dmat4 matrix, needMatrix(file, key, where));
+    RigidMotion out;
     out.shift = glm::dvec3(matrix[3]);
     // It turns poses, not pixels: notes give corrections in pixels of a focal length of 1000.
-    STX_TRY(out.rotation, repairRotation(glm::dmat3(matrix), 1000.0,
-                                         fmt::format("{}: '{}'", where, matrixKey), job));
-    STX_TRY(const auto scale, findNumber(file, scaleKey, where));
-    out.scale = scale.value_or(1.0);
-    if (!(out.scale > 0))
-        return failAt(where, ErrorCode::invalidInput, "'{}' is {:g}; it must be above 0", scaleKey,
-                      out.scale);
+    STX_TRY(out.rotation,
+            repairRotation(glm::dmat3(matrix), 1000.0, fmt::format("{}: '{}'", where, key), job));
     return out;
+}
+
+/// 1 where there is none.
+Result<double> scaleOf(const Json& file, const char* key, const std::string& where) {
+    STX_TRY(const auto scale, findNumber(file, key, where));
+    if (scale && !(*scale > 0))
+        return failAt(where, ErrorCode::invalidInput, "'{}' is {:g}; it must be above 0", key,
+                      *scale);
+    return scale.value_or(1.0);
 }
 
 }  // namespace
@@ -49,14 +51,22 @@ Result<void> undoDataparser(const Json& dataparser, const Json* transforms,
                             std::vector<SetView>& views, Job& job) {
     if (!dataparser.is_object())
         return fail(ErrorCode::invalidInput, "'transform' and 'scale' are expected in it");
-    STX_TRY(const Similarity normalised, similarityOf(dataparser, "transform", "scale", "", job));
-    Similarity applied;
-    if (transforms != nullptr && transforms->is_object() &&
-        transforms->contains("applied_transform")) {
-        STX_TRY(applied, similarityOf(*transforms, "applied_transform", "applied_scale",
-                                      "transforms.json", job));
+    STX_TRY(const RigidMotion normalised, rigidMotionOf(dataparser, "transform", "", job));
+    STX_TRY(double scale, scaleOf(dataparser, "scale", ""));
+    // nerfstudio trains with poses of the transforms.json, oriented, centred and scaled. What was
+    // applied before is in the matrix and in the scale that it writes, but not in those poses.
+    RigidMotion applied;
+    if (transforms != nullptr && transforms->is_object()) {
+        if (transforms->contains("applied_transform")) {
+            STX_TRY(applied,
+                    rigidMotionOf(*transforms, "applied_transform", "transforms.json", job));
+        }
+        STX_TRY(const double appliedScale,
+                scaleOf(*transforms, "applied_scale", "transforms.json"));
+        scale /= appliedScale;
     }
     for (SetView& view : views) {
+        view.camera.position /= scale;
         normalised.undo(view.camera);
         applied.apply(view.camera);
         if (auto ok = view.camera.check(); !ok)

@@ -9,10 +9,34 @@
 namespace stx::imagesets {
 namespace {
 
+Result<void> setPose(const Json& c, const std::string& where, Camera& camera) {
+    STX_TRY(const auto p, needNumbers(c, "position", 3, where));
+    camera.position = {p[0], p[1], p[2]};
+    STX_TRY(const auto axisAngle, findNumbers(c, "orientation", 4, where));
+    STX_TRY(const auto quaternion, findNumbers(c, "quaternion", 4, where));
+    if (quaternion) {
+        const auto& q = *quaternion;
+        if (auto r = rotationFromQuaternion({q[0], q[1], q[2], q[3]}, where); !r)
+            return propagate(r);
+        camera.orientation = glm::normalize(glm::dquat(q[3], q[0], q[1], q[2]));
+    } else if (axisAngle) {
+        const auto& a = *axisAngle;
+        if (!(glm::length(glm::dvec3(a[0], a[1], a[2])) > 1e-9) && a[3] != 0)
+            return failAt(where, ErrorCode::invalidInput, "the axis of 'orientation' is zero");
+        camera.orientation = quatFromAxisAngle({a[0], a[1], a[2], a[3]});
+    } else {
+        return failAt(where, ErrorCode::invalidInput,
+                      "neither 'orientation' (axis x y z, angle) nor 'quaternion' (x y z w) is "
+                      "given");
+    }
+    return {};
+}
+
 Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& where) {
     SetView view;
     STX_TRY(const auto name, findText(c, "name", where));
     view.name = name.value_or(fmt::format("view{:03}", index));
+    STX_TRY(view.time, findNumber(c, "time", where));
     Camera& camera = view.camera;
     STX_TRY(const double width, needNumber(c, "width", where));
     STX_TRY(const double height, needNumber(c, "height", where));
@@ -66,34 +90,25 @@ Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& wher
             STX_TRY(const auto value, findNumber(c, key, where));
             *to = value.value_or(0);
         }
+        view.lens.skew /= camera.fx;
     }
-    STX_TRY(const auto p, needNumbers(c, "position", 3, where));
-    camera.position = {p[0], p[1], p[2]};
-    STX_TRY(const auto axisAngle, findNumbers(c, "orientation", 4, where));
-    STX_TRY(const auto quaternion, findNumbers(c, "quaternion", 4, where));
-    if (quaternion) {
-        const auto& q = *quaternion;
-        if (auto r = rotationFromQuaternion({q[0], q[1], q[2], q[3]}, where); !r)
-            return propagate(r);
-        camera.orientation = glm::normalize(glm::dquat(q[3], q[0], q[1], q[2]));
-    } else if (axisAngle) {
-        const auto& a = *axisAngle;
-        if (!(glm::length(glm::dvec3(a[0], a[1], a[2])) > 1e-9) && a[3] != 0)
-            return failAt(where, ErrorCode::invalidInput, "the axis of 'orientation' is zero");
-        camera.orientation = quatFromAxisAngle({a[0], a[1], a[2], a[3]});
-    } else {
-        return failAt(where, ErrorCode::invalidInput,
-                      "neither 'orientation' (axis x y z, angle) nor 'quaternion' (x y z w) is "
-                      "given");
-    }
+    STX_CHECK(setPose(c, where, camera));
     if (auto ok = camera.check(); !ok) return tl::unexpected(ok.error().at(where));
     return view;
 }
 
-/// `depthUnit`: integers times that are distances, 0 is none (default: millimetres). `nearPlane`
-/// and `farPlane`: the code of DepthImage.
-Result<void> setDepth(const Json& c, const ImageSetOptions& options, const std::string& where,
-                      SetView& view) {
+/// Of depth of which nothing is said.
+Result<void> floatsOnly(Image<float>&, const Camera&, int largest, Job&) {
+    if (largest == 0) return {};
+    return fail(ErrorCode::invalidInput,
+                "the depth is stored as integers; 'depthUnit', or 'nearPlane' and 'farPlane', must "
+                "tell what they mean");
+}
+
+}  // namespace
+
+Result<std::optional<Distances>> camerasDistances(const Json& c, const ImageSetOptions& options,
+                                                  const std::string& where) {
     STX_TRY(auto unit, findNumber(c, "depthUnit", where));
     STX_TRY(const auto nearPlane, findNumber(c, "nearPlane", where));
     STX_TRY(const auto farPlane, findNumber(c, "farPlane", where));
@@ -115,31 +130,17 @@ Result<void> setDepth(const Json& c, const ImageSetOptions& options, const std::
                       "its depth is not in steps of a distance, as 'nearPlane' says; leave out "
                       "--depth-unit");
     if (given) unit = options.depthUnit;
-    if (!nearPlane && !unit) {
-        view.distances = [](Image<float>&, const Camera&, int largest, Job&) -> Result<void> {
-            if (largest == 0) return {};
-            return fail(ErrorCode::invalidInput,
-                        "the depth is stored as integers; 'depthUnit', or 'nearPlane' and "
-                        "'farPlane', must tell what they mean");
-        };
-        return {};
-    }
-    view.distances = [unit, nearPlane, farPlane, given](Image<float>& values, const Camera& camera,
-                                                        int largest, Job& job) -> Result<void> {
-        if (largest == 0 && given) return depthIsFloats("--depth-unit");
-        if (largest == 0) return {};
-        if (unit) return scaledIntegers(*unit)(values, camera, largest, job);
+    if (unit) return orFloats(options, scaledIntegers(*unit));
+    if (!nearPlane) return std::nullopt;
+    const auto planes = [from = *nearPlane, to = *farPlane](Image<float>& values, const Camera&,
+                                                            int largest, Job&) -> Result<void> {
         const double last = largest - 1;
         for (float& v : values.pixels())
-            v = v == 0 ? 0.0f
-                       : static_cast<float>(*nearPlane +
-                                            (1 - (v - 1) / last) * (*farPlane - *nearPlane));
+            v = v == 0 ? 0.0f : static_cast<float>(from + (1 - (v - 1) / last) * (to - from));
         return {};
     };
-    return {};
+    return orFloats(options, planes);
 }
-
-}  // namespace
 
 Result<std::vector<SetView>> camerasJsonViews(const Json& file, Job& job) {
     const Json& cameras = file["cameras"];
@@ -178,7 +179,9 @@ Result<SetDescription> describeCamerasJson(const path& given, const ImageSetOpti
         STX_TRY(view.texture, sourceInside(folder, texture, place, job.limits));
         STX_TRY(const std::string depth, needText(c, "depth", place));
         STX_TRY(view.depth, sourceInside(folder, depth, place, job.limits));
-        STX_CHECK(setDepth(c, options, place, view));
+        STX_TRY(const auto told, camerasDistances(c, options, place));
+        view.distances = told ? *told : Distances(floatsOnly);
+        view.time.reset();  // it is of one moment
     }
     return set;
 }

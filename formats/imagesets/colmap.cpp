@@ -186,6 +186,14 @@ Result<std::vector<ColmapImage>> imagesFromText(std::string_view text, const Lim
     for (const TextLine& line : linesOf(text, true)) {
         if (!line.text.empty() && line.text[0] == '#') continue;
         if (points) {
+            // Its last word tells it from a line of an image, which ends in the image's name.
+            const std::string_view last = line.lastWord();
+            if (!last.empty() && !numberOf(last, ""))
+                return failAt(
+                    line.where(), ErrorCode::invalidInput,
+                    "'{}' where a line of points is expected; behind each image comes one "
+                    "with 'X Y POINT3D_ID' of each of its points, which may be empty",
+                    last.substr(0, 40));
             points = false;
             continue;
         }

@@ -65,31 +65,37 @@ Result<std::shared_ptr<Film>> openNamed(const path& folder, const std::string& p
     return std::shared_ptr<Film>(std::move(film));
 }
 
-/// What the cameras' file says of depth, for each of its views.
+/// What the cameras' file says of the depth of one of its cameras; nothing: it does not.
+Result<std::optional<Distances>> toldDistances(const Json& json, JsonKind kind, std::size_t i,
+                                               const std::string& where,
+                                               const ImageSetOptions& options) {
+    if (kind == JsonKind::transforms) return transformsDistances(json, where);
+    const Json& camera = json["cameras"][i];
+    const std::string place = fmt::format("{}: cameras[{}]", where, i);
+    if (kind == JsonKind::cameras) return camerasDistances(camera, options, place);
+    return mivDistances(camera, place);
+}
+
+/// What depth is, for each of the file's cameras.
 Result<std::vector<Distances>> distancesOf(const Json& json, std::size_t count,
                                            const std::string& where,
                                            const ImageSetOptions& options) {
-    Distances all;
-    if (options.depthUnit > 0) {
-        all = scaledIntegers(options.depthUnit);
-    } else if (options.depthMax > 0) {
-        all = normalisedDisparity(options.depthMin, options.depthMax, true);
-    } else if (jsonKindOf(json) == JsonKind::miv) {
-        std::vector<Distances> each;
-        for (std::size_t i = 0; i < count; ++i) {
-            STX_TRY(each.emplace_back(),
-                    mivDistances(json["cameras"][i], fmt::format("{}: cameras[{}]", where, i)));
-        }
-        return each;
-    } else if (jsonKindOf(json) == JsonKind::transforms) {
-        STX_TRY(const auto told, transformsDistances(json, where));
-        if (told) all = *told;
+    if (options.depthUnit > 0)
+        return std::vector<Distances>(count, scaledIntegers(options.depthUnit));
+    if (options.depthMax > 0)
+        return std::vector<Distances>(
+            count, normalisedDisparity(options.depthMin, options.depthMax, true));
+    const JsonKind kind = jsonKindOf(json);
+    std::vector<Distances> each;
+    for (std::size_t i = 0; i < count; ++i) {
+        STX_TRY(const auto told, toldDistances(json, kind, i, where, options));
+        if (!told)
+            return failAt(where, ErrorCode::invalidInput,
+                          "it does not say what the values of depth are; give --depth-unit (scene "
+                          "units of one step, 0.001 for millimetres in metres) or --depth-range");
+        each.push_back(*told);
     }
-    if (!all)
-        return failAt(where, ErrorCode::invalidInput,
-                      "it does not say what the values of depth are; give --depth-unit (scene "
-                      "units of one step, 0.001 for millimetres in metres) or --depth-range");
-    return std::vector<Distances>(count, all);
+    return each;
 }
 
 /// One film of colour and one of depth.

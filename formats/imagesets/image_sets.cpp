@@ -24,18 +24,28 @@ namespace {
 
 using namespace imagesets;
 
-/// The masks that a pattern names, beside the set or where stx runs.
-void nameMasks(SetDescription& set, const path& from, const std::string& pattern) {
+/// The masks that the options name, beside the set or where stx runs. Errors (usage): {frame} of a
+/// set whose frames have times instead of numbers.
+Result<void> nameMasks(SetDescription& set, const path& from, const ImageSetOptions& options) {
+    const std::string& pattern = options.maskPattern;
+    if (pattern.find("{frame") != std::string::npos &&
+        std::ranges::any_of(set.views, [](const SetView& view) { return view.time.has_value(); }))
+        return failAt(
+            inQuotes(from.string()), ErrorCode::usage,
+            "{{frame}} in --mask is the number of a frame, and these pictures have times; "
+            "{{stem}} or {{name}} tells one mask from another");
     std::error_code ec;
     const path folder = std::filesystem::is_directory(from, ec) ? from : folderOf(from);
     for (SetView& view : set.views) {
-        std::string name = filled(pattern, {view.name, 0, 0, 0});
+        std::string name =
+            filled(pattern, {view.name, view.camera.width, view.camera.height, options.frame});
         if (const auto at = name.find("{stem}"); at != std::string::npos)
             name.replace(at, 6, path(view.texture.name).stem().string());
         const path beside = folder / name;
         view.mask.path = std::filesystem::exists(beside, ec) ? beside : path(name);
         view.mask.name = name;
     }
+    return {};
 }
 
 /// What the files say, without the options that are of every kind.
@@ -342,7 +352,7 @@ class StillSet : public Sequence {
 Result<SetDescription> imagesets::describeSet(const path& path, const ImageSetOptions& options,
                                               Job& job) {
     STX_TRY(SetDescription set, describeFiles(path, options, job));
-    if (!options.maskPattern.empty()) nameMasks(set, path, options.maskPattern);
+    if (!options.maskPattern.empty()) STX_CHECK(nameMasks(set, path, options));
     return set;
 }
 

@@ -58,8 +58,8 @@ struct ImageSetOptions {
     /// .avi): their frames are those of the cameras in `path`, a JSON file.
     std::string texturePattern, depthPattern;
     /// Pictures of what belongs to the object, white on black, as large as the colour pictures:
-    /// file names with {stem} (of the colour picture's file) and {name} in them, beside the
-    /// set or in the current folder; empty: none.
+    /// file names with {stem} (of the colour picture's file), {name}, or {frame} of sets whose
+    /// frames are files by number, beside the set or in the current folder; empty: none.
     std::string maskPattern;
     /// What pixels without depth are. Without a value: what the depth itself says (1e9 and more or
     /// infinity somewhere: nothing is there, 0 and NaN are not known), else empty where the picture

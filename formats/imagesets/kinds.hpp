@@ -45,6 +45,11 @@ using std::filesystem::path;
                                                                    const std::string& where);
 /// Of a camera of MIV's list.
 [[nodiscard]] Result<Distances> mivDistances(const Json& camera, const std::string& where);
+/// Of a camera of our cameras.json. `depthUnit`: integers times that are distances, 0 is none;
+/// `nearPlane` and `farPlane`: the code of DepthImage; neither: nothing.
+[[nodiscard]] Result<std::optional<Distances>> camerasDistances(const Json& camera,
+                                                                const ImageSetOptions& options,
+                                                                const std::string& where);
 
 /// The file in `folder` with the poses of Open3D's or Redwood's recordings; empty: none.
 [[nodiscard]] std::string trajectoryLogIn(const path& folder);
@@ -66,7 +71,8 @@ enum class JsonKind { transforms, miv, cameras, cameraPath, none };
 /// Takes poses out of the world that nerfstudio trains and shows in, with what its
 /// dataparser_transforms.json says: normalised = scale * transform * world. The world is that of
 /// the images before nerfstudio prepared them (COLMAP's), or that of their transforms.json, where
-/// one is given that names the difference (applied_transform, applied_scale).
+/// one is given that names the difference (applied_transform, applied_scale), which is part of the
+/// transform and of the scale.
 [[nodiscard]] Result<void> undoDataparser(const Json& dataparser, const Json* transforms,
                                           std::vector<SetView>& views, Job& job);
 /// Those of a COLMAP model (its folder, the workspace, or one of its files), by their names.

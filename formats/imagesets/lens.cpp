@@ -13,13 +13,13 @@ glm::dvec2 Lens::realFromIdeal(const Camera& c, glm::dvec2 pixel) const {
         const double r = std::sqrt(r2), t = std::atan(r), t2 = t * t;
         const double scale =
             r > 1e-12 ? t * (1.0 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4)))) / r : 1.0;
-        return {c.fx * x * scale + skew * y * scale + c.cx, c.fy * y * scale + c.cy};
+        return {c.fx * (x + skew * y) * scale + c.cx, c.fy * y * scale + c.cy};
     }
     double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
     if (rational) radial /= 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
     const double xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
     const double yd = y * radial + 2.0 * p2 * x * y + p1 * (r2 + 2.0 * y * y);
-    return {c.fx * xd + skew * yd + c.cx, c.fy * yd + c.cy};
+    return {c.fx * (xd + skew * yd) + c.cx, c.fy * yd + c.cy};
 }
 
 namespace {
@@ -75,6 +75,25 @@ bool Lens::invertible(const Camera& c) const {
         if (inside && !(dx.x * dy.y - dx.y * dy.x > 1e-3)) fine = false;
     });
     return fine;
+}
+
+double Focal::of(int side) const {
+    return pixels ? *pixels : side * 0.5 / std::tan(*angle * 0.5);
+}
+
+void Pinhole::fill(Camera& camera) const {
+    if (x.said()) camera.fx = camera.fy = x.of(camera.width);
+    if (y.said()) camera.fy = y.of(camera.height);
+    camera.cx = cx.value_or(camera.width * 0.5);
+    camera.cy = cy.value_or(camera.height * 0.5);
+}
+
+std::optional<glm::ivec2> Pinhole::sizeAround() const {
+    if (!cx || !cy) return std::nullopt;
+    const glm::dvec2 size = glm::round(glm::dvec2(*cx, *cy) * 2.0);
+    constexpr double kMost = 65535;
+    if (!(size.x >= 1 && size.y >= 1 && size.x <= kMost && size.y <= kMost)) return std::nullopt;
+    return glm::ivec2(size);
 }
 
 }  // namespace stx::imagesets

@@ -30,17 +30,7 @@ constexpr double kCutWorthTelling = 0.005;
 
 /// Fills in a camera that has no size, and errors when sizes disagree.
 Result<Camera> cameraOfSize(const SetView& set, int width, int height) {
-    Camera c = set.camera;
-    if (c.width == 0) {
-        c.width = width;
-        c.height = height;
-        if (!set.panorama) {
-            c.fx = width * 0.5 / std::tan(set.angleX * 0.5);
-            c.fy = set.angleY > 0 ? height * 0.5 / std::tan(set.angleY * 0.5) : c.fx;
-        }
-        c.cx = width * 0.5;
-        c.cy = height * 0.5;
-    }
+    Camera c = set.cameraOf({width, height});
     // Principal points are near the middle of pictures.
     constexpr double kNearMiddle = 0.1;
     if (set.sizeGuessed && std::abs(c.width - width) <= kNearMiddle * width &&

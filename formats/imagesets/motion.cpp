@@ -17,6 +17,11 @@ constexpr double kLongest = 1e15;
 /// a rule, in seconds.
 constexpr double kTick = 1e-6;
 
+/// Of times in order.
+bool oneMoment(double a, double b) {
+    return b - a <= halfTick(kTick, b);
+}
+
 using Pose = std::tuple<double, double, double, double, double, double, double>;
 
 Pose poseOf(const Camera& c) {
@@ -24,8 +29,13 @@ Pose poseOf(const Camera& c) {
             c.orientation.y, c.orientation.z, c.orientation.w};
 }
 
+/// The moment of a time, by number: the last that begins no later.
+std::size_t momentNumber(double time, const std::vector<double>& moments) {
+    return static_cast<std::size_t>(std::ranges::upper_bound(moments, time) - moments.begin()) - 1;
+}
+
 /// Which camera took each view, by name.
-std::vector<std::string> takersOf(const SetDescription& set) {
+std::vector<std::string> takersOf(const SetDescription& set, const std::vector<double>& moments) {
     std::vector<std::string> takers;
     if (std::ranges::any_of(set.views, [](const SetView& v) { return !v.taker.empty(); })) {
         for (const SetView& view : set.views)
@@ -41,17 +51,17 @@ std::vector<std::string> takersOf(const SetDescription& set) {
                                  : fmt::format("camera{}", poses.at(poseOf(view.camera))));
         return takers;
     }
-    // No pose comes twice: cameras move, as many as there are pictures of one time.
-    std::map<double, std::size_t> ofTime;
+    // No pose comes twice: cameras move, as many as there are pictures of one moment.
+    std::vector<std::size_t> ofMoment(moments.size());
     for (const SetView& view : set.views) {
-        const std::size_t rank = ofTime[*view.time]++;
+        const std::size_t rank = ofMoment[momentNumber(*view.time, moments)]++;
         takers.push_back(rank == 0 ? "camera" : fmt::format("camera{}", rank));
     }
     return takers;
 }
 
 bool beginsLater(const SetView& view, double time) {
-    return *view.time > time + halfTick(kTick, time);
+    return !oneMoment(time, *view.time);
 }
 
 }  // namespace
@@ -123,7 +133,6 @@ Result<Motion> motionOf(const SetDescription& set, const ImageSetOptions& option
         times.push_back(*view.time);
     }
     std::ranges::sort(times);
-    const auto oneMoment = [](double a, double b) { return b - a <= halfTick(kTick, b); };
     times.erase(std::unique(times.begin(), times.end(), oneMoment), times.end());
     if (times.size() < 2) return motion;
     const double span = times.back() - times.front();
@@ -138,7 +147,7 @@ Result<Motion> motionOf(const SetDescription& set, const ImageSetOptions& option
                      : times.back() + span / static_cast<double>(times.size() - 1);
     motion.times = std::move(times);
 
-    const auto takers = takersOf(set);
+    const auto takers = takersOf(set, motion.times);
     for (std::size_t i = 0; i < set.views.size(); ++i) {
         auto track = std::ranges::find(motion.tracks, takers[i], &Motion::Track::name);
         if (track == motion.tracks.end())
@@ -152,7 +161,7 @@ Result<Motion> motionOf(const SetDescription& set, const ImageSetOptions& option
         for (std::size_t i = 1; i < track.views.size(); ++i) {
             const SetView& view = set.views[track.views[i]];
             const SetView& before = set.views[track.views[i - 1]];
-            if (*view.time == *before.time)
+            if (momentNumber(*view.time, motion.times) == momentNumber(*before.time, motion.times))
                 return fail(ErrorCode::invalidInput,
                             "'{}' and '{}' are both of camera '{}' at {:g} s; give each picture "
                             "its own time, or take all as views of one moment (--still)",

@@ -42,7 +42,7 @@ struct Motion {
 
 /// What of a set moves: nothing when its views have no times or one only, or options.moving says
 /// so. Errors (invalidInput): some views have times and others do not, times that are not finite,
-/// two pictures of one camera at one time.
+/// two pictures of one camera at one moment.
 [[nodiscard]] Result<Motion> motionOf(const SetDescription& set, const ImageSetOptions& options);
 
 }  // namespace stx::imagesets

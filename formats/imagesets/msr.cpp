@@ -53,7 +53,7 @@ Result<Placed> place(const MsrCamera& m, int width, int height, const std::strin
     v.cx = m.cx + 0.5;
     v.cy = height - 0.5 - m.cy;
     p.camera = cameraFromVision(v);
-    p.lens.skew = v.fy < 0 ? -m.skew : m.skew;
+    p.lens.skew = (v.fy < 0 ? -m.skew : m.skew) / p.camera.fx;
     p.lens.k1 = m.k1;
     p.lens.k2 = m.k2;
     return p;

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include <fmt/ranges.h>
+
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/pictures.hpp"
@@ -63,22 +65,68 @@ Result<std::vector<LoggedPose>> parseLog(std::string_view text) {
     return poses;
 }
 
+/// What a file tells of the camera.
+struct ToldIntrinsics {
+    PixelIntrinsics k;
+    std::optional<glm::ivec2> size;  ///< of its pictures
+    std::string where;
+};
+
 /// Those of a JSON in the folder; nothing: there is none.
-Result<std::optional<PixelIntrinsics>> toldIntrinsics(const path& folder, Job& job) {
+Result<std::optional<ToldIntrinsics>> toldIntrinsics(const path& folder, Job& job) {
     for (const std::string& name : filesIn(folder)) {
         if (path(name).extension() != ".json") continue;
         STX_TRY(const Json json, readJson(folder / name, job.limits));
         if (!json.is_object() || !json.contains("intrinsic_matrix")) continue;
-        const Json& m = json["intrinsic_matrix"];
-        const bool sound = m.is_array() && m.size() == 9 &&
-                           std::ranges::all_of(m, [](const Json& v) { return v.is_number(); });
-        if (!sound)
-            return failAt(inQuotes((folder / name).string()), ErrorCode::invalidInput,
-                          "'intrinsic_matrix' is not a list of 9 numbers");
-        return PixelIntrinsics(m[0].get<double>(), m[4].get<double>(), m[6].get<double>(),
-                               m[7].get<double>());
+        ToldIntrinsics told;
+        told.where = inQuotes((folder / name).string());
+        STX_TRY(const auto m, needNumbers(json, "intrinsic_matrix", 9, told.where));
+        if (m[1] != 0 || m[2] != 0 || m[3] != 0 || m[5] != 0 || m[8] != 1)
+            return failAt(told.where, ErrorCode::invalidInput,
+                          "'intrinsic_matrix' is [{:g}]; a matrix by columns, [fx, 0, 0, 0, fy, 0, "
+                          "cx, cy, 1], is expected, or give --intrinsics",
+                          fmt::join(m, ", "));
+        told.k = {m[0], m[4], m[6], m[7]};
+        if (told.k.x == 0 || told.k.y == 0)
+            return failAt(told.where, ErrorCode::invalidInput,
+                          "the focal lengths are {:g} and {:g}; give others with --intrinsics",
+                          told.k.x, told.k.y);
+        if (json.contains("width") || json.contains("height")) {
+            STX_TRY(const double width, needNumber(json, "width", told.where));
+            STX_TRY(const double height, needNumber(json, "height", told.where));
+            glm::ivec2& size = told.size.emplace();
+            STX_TRY(size.x, imageSide(width, "width", 65535, told.where));
+            STX_TRY(size.y, imageSide(height, "height", 65535, told.where));
+        }
+        return told;
     }
     return std::nullopt;
+}
+
+/// Of pictures of this size: given, else told, else the usual ones.
+Result<PixelIntrinsics> intrinsicsOf(const path& folder, glm::ivec2 size,
+                                     const ImageSetOptions& options, const std::string& where,
+                                     Job& job) {
+    STX_TRY(const auto asked, within(where, givenIntrinsics(options)));
+    if (asked) {
+        noteOddCentre(*asked, size, job);
+        return *asked;
+    }
+    STX_TRY(const auto told, toldIntrinsics(folder, job));
+    if (!told) return usualIntrinsics("PrimeSense's usual ones", kPrimeSense, size, job);
+    const glm::ivec2 of = told->size.value_or(size);
+    if (of == size) return told->k;
+    if (!sameShape(of, size))
+        return failAt(told->where, ErrorCode::invalidInput,
+                      "it is of pictures of {}x{}, but the set's have {}x{} pixels; give their own "
+                      "with --intrinsics",
+                      of.x, of.y, size.x, size.y);
+    const PixelIntrinsics k = scaledTo(size, told->k, of);
+    job.note(
+        fmt::format("{}: the intrinsics are scaled from {}x{} to the pictures' {}x{} (fx {:g}, fy "
+                    "{:g}, cx {:g}, cy {:g}); others with --intrinsics",
+                    told->where, of.x, of.y, size.x, size.y, k.x, k.y, k.z, k.w));
+    return k;
 }
 
 }  // namespace
@@ -118,14 +166,6 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
                       colours.size(), colourFolder, depths.size());
     STX_CHECK(
         checkViewCount(poses.size() / static_cast<std::size_t>(options.every), job.limits, where));
-    STX_TRY(const auto asked, within(where, givenIntrinsics(options)));
-    auto told = asked;
-    if (!told) {
-        STX_TRY(told, toldIntrinsics(folder, job));
-    }
-    if (told && (told->x == 0 || told->y == 0))
-        return failAt(where, ErrorCode::invalidInput, "the focal lengths are {:g} and {:g}",
-                      told->x, told->y);
     PixelIntrinsics k(0);
     SetDescription set;
     std::optional<glm::ivec2> size;
@@ -143,8 +183,7 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
                                "depth/" + depths[pose.frame], where, job.limits, view));
         if (!size) {
             STX_TRY(size, within(where, imageSizeOf(view.texture, job)));
-            k = told ? *told : usualIntrinsics("PrimeSense's usual ones", kPrimeSense, *size, job);
-            if (asked) noteOddCentre(k, *size, job);
+            STX_TRY(k, intrinsicsOf(folder, *size, options, where, job));
         }
         VisionCamera v;
         STX_TRY(v.worldFromCamera,
@@ -158,7 +197,7 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
         v.width = size->x;
         v.height = size->y;
         view.camera = cameraFromVision(v);
-        view.distances = sensorIntegers(unitOf(options, kMillimetre));
+        view.distances = sensorsOrFloats(options, kMillimetre);
         view.sensor = true;
         set.views.push_back(std::move(view));
     }

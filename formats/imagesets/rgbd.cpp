@@ -31,6 +31,29 @@ struct Intrinsics {
     std::string_view whose;  ///< of pictures of 640x480, published; empty: told of these pictures
 };
 
+/// Those of a text file: four numbers, with a lens nine as TUM lists its cameras, or a matrix.
+Result<Intrinsics> intrinsicsIn(const path& file, Job& job) {
+    STX_TRY(const auto n, numbersIn(file, job.limits));
+    if (n.size() == 4) return Intrinsics{{n[0], n[1], n[2], n[3]}, {}, {}};
+    if (n.size() == 9) {
+        const bool lastRow = n[6] == 0 && n[7] == 0 && n[8] == 1;
+        if (lastRow && n[1] == 0 && n[3] == 0) return Intrinsics{{n[0], n[4], n[2], n[5]}, {}, {}};
+        Lens lens;
+        lens.k1 = n[4];
+        lens.k2 = n[5];
+        lens.p1 = n[6];
+        lens.p2 = n[7];
+        lens.k3 = n[8];
+        // A matrix by columns has 0 in the place of fy.
+        if (!lastRow && n[0] != 0 && n[1] != 0)
+            return Intrinsics{{n[0], n[1], n[2], n[3]}, lens, {}};
+    }
+    return failAt(inQuotes(file.string()), ErrorCode::invalidInput,
+                  "{} numbers that are no camera; 'fx fy cx cy', 'fx fy cx cy k1 k2 p1 p2 k3' or "
+                  "the matrix 'fx 0 cx 0 fy cy 0 0 1' is expected, or give --intrinsics",
+                  n.size());
+}
+
 /// Given, else in a file, else those published for the recording.
 Result<Intrinsics> findIntrinsics(const path& folder, bool icl, const ImageSetOptions& options,
                                   const std::string& where, Job& job) {
@@ -38,13 +61,7 @@ Result<Intrinsics> findIntrinsics(const path& folder, bool icl, const ImageSetOp
     if (asked) return Intrinsics{*asked, {}, {}};
     const std::string file = firstThere(folder, {"intrinsics.txt", "calibration.txt", "camera.txt",
                                                  "camera_intrinsics.txt", "camera-intrinsics.txt"});
-    if (!file.empty()) {
-        STX_TRY(const auto n, numbersIn(folder / file, job.limits));
-        if (n.size() == 9) return Intrinsics{{n[0], n[4], n[2], n[5]}, {}, {}};
-        if (n.size() == 4) return Intrinsics{{n[0], n[1], n[2], n[3]}, {}, {}};
-        return failAt(inQuotes((folder / file).string()), ErrorCode::invalidInput,
-                      "{} numbers; 'fx fy cx cy' or a 3x3 matrix is expected", n.size());
-    }
+    if (!file.empty()) return intrinsicsIn(folder / file, job);
     const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
     const auto has = [&](const char* part) { return name.find(part) != std::string::npos; };
     if (icl) return Intrinsics{{481.2, -480.0, 319.5, 239.5}, {}, "ICL-NUIM's published ones"};
@@ -146,6 +163,16 @@ Result<std::vector<TimedPose>> readTrajectory(const path& folder, const std::str
     const auto lost = std::ranges::count(poses, true, &TimedPose::lost);
     STX_CHECK(noteLost(static_cast<std::size_t>(lost), poses.size(), where, strict, job));
     return poses;
+}
+
+/// The file in the folder with its poses; empty: there is none.
+std::string trajectoryIn(const path& folder) {
+    std::string found = firstThere(folder, {"groundtruth.txt", "pose.txt", "poses.txt",
+                                            "trajectory.txt", "CameraTrajectory.txt"});
+    if (found.empty())
+        for (const std::string& name : filesIn(folder))
+            if (name.ends_with(".gt.freiburg")) found = name;
+    return found;
 }
 
 /// Files named by a number (`17.png`), by that number.
@@ -288,13 +315,7 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
     const bool isFolder = std::filesystem::is_directory(given, ec);
     const path folder = isFolder ? given : folderOf(given);
     const std::string where = inQuotes(given.string());
-    std::string trajectory = isFolder ? "" : given.filename().string();
-    if (trajectory.empty())
-        trajectory = firstThere(folder, {"groundtruth.txt", "pose.txt", "poses.txt",
-                                         "trajectory.txt", "CameraTrajectory.txt"});
-    if (trajectory.empty())
-        for (const std::string& name : filesIn(folder))
-            if (name.ends_with(".gt.freiburg")) trajectory = name;
+    const std::string trajectory = isFolder ? trajectoryIn(folder) : given.filename().string();
     if (trajectory.empty())
         return failAt(where, ErrorCode::io,
                       "no trajectory was found in it; groundtruth.txt, pose.txt, trajectory.txt or "
@@ -325,7 +346,10 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
     for (const Frame& frame : frames) {
         SetView view;
         view.name = path(frame.texture).stem().string();
-        if (timed) view.time = frame.time;
+        if (timed) {
+            view.time = frame.time;
+            view.taker = "camera";  // one, even where it rests
+        }
         STX_CHECK(findPictures(folder, frame.texture, frame.depth, where, job.limits, view));
         if (view.missing) {
             set.views.push_back(std::move(view));
@@ -358,7 +382,7 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
         view.camera = cameraFromVision(v);
         if (depth) view.depthCamera = cameraBeside(v, *depth);
         view.lens = found.lens;
-        view.distances = sensorIntegers(unitOf(options, kMetre));
+        view.distances = sensorsOrFloats(options, kMetre);
         view.sensor = true;
         set.views.push_back(std::move(view));
     }

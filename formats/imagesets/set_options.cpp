@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <utility>
 
 #include "lib/background/behind_photo.hpp"
 
@@ -102,26 +103,32 @@ tl::unexpected<Error> depthIsFloats(std::string_view option) {
                 "the depth is floats, which are distances; {} is of grey pictures", option);
 }
 
-double unitOf(const ImageSetOptions& options, double usual) {
-    return options.depthUnit > 0 ? options.depthUnit : usual;
+Distances orFloats(const ImageSetOptions& options, Distances integers) {
+    const bool given = options.depthUnit > 0;
+    return [integers = std::move(integers), given](Image<float>& values, const Camera& camera,
+                                                   int largest, Job& job) -> Result<void> {
+        if (largest > 0) return integers(values, camera, largest, job);
+        if (given) return depthIsFloats("--depth-unit");
+        return {};
+    };
+}
+
+Distances sensorsOrFloats(const ImageSetOptions& options, double usual) {
+    return orFloats(options, sensorIntegers(options.depthUnit > 0 ? options.depthUnit : usual));
 }
 
 Distances integersOrFloats(const ImageSetOptions& options, std::optional<double> named) {
-    const bool given = options.depthUnit > 0;
-    const double unit = unitOf(options, named.value_or(kMillimetre));
-    const Distances integers = given || named ? scaledIntegers(unit) : sensorIntegers(unit);
-    return [integers, given](Image<float>& values, const Camera& camera, int largest,
-                             Job& job) -> Result<void> {
-        if (largest == 0) {
-            if (given) return depthIsFloats("--depth-unit");
-            return {};
-        }
+    if (options.depthUnit > 0) named = options.depthUnit;
+    const Distances integers = named ? scaledIntegers(*named) : sensorIntegers(kMillimetre);
+    const auto of16Bits = [integers](Image<float>& values, const Camera& camera, int largest,
+                                     Job& job) -> Result<void> {
         if (largest <= 255)
             return fail(ErrorCode::invalidInput,
                         "the depth has {} bits; 16 (millimetres) or floats are expected",
                         std::bit_width(static_cast<unsigned>(largest)));
         return integers(values, camera, largest, job);
     };
+    return orFloats(options, of16Bits);
 }
 
 }  // namespace stx::imagesets

@@ -20,11 +20,15 @@ inline constexpr std::string_view kFilms = "films", kCalibrated = "middlebury wi
 /// The error (usage) of an option that says what integers of depth are, where depth is floats.
 [[nodiscard]] tl::unexpected<Error> depthIsFloats(std::string_view option);
 
-/// Scene units of one step of integer depth: as --depth-unit says, else `usual`.
-[[nodiscard]] double unitOf(const ImageSetOptions& options, double usual);
+/// Of sets that hold integers or floats: floats are distances, whatever `integers` makes of the
+/// others. Errors (usage): floats, and --depth-unit is given.
+[[nodiscard]] Distances orFloats(const ImageSetOptions& options, Distances integers);
 
-/// Of sets that hold integers of 16 bits or floats, which are distances. The integers are steps of
-/// --depth-unit, else of the unit that the set names, else millimetres of a sensor.
+/// Of sensors, sensorIntegers() in steps of --depth-unit, else of `usual`, or floats.
+[[nodiscard]] Distances sensorsOrFloats(const ImageSetOptions& options, double usual);
+
+/// Of sets that hold integers of 16 bits or floats. The integers are steps of --depth-unit, else of
+/// the unit that the set names, else millimetres of a sensor.
 /// Errors: (invalidInput) 8 bits; (usage) floats, and --depth-unit is given.
 [[nodiscard]] Distances integersOrFloats(const ImageSetOptions& options,
                                          std::optional<double> named);

@@ -64,10 +64,9 @@ struct SetShift {
 /// One picture with depth of a set.
 struct SetView {
     std::string name;
-    /// In our axes. Width 0: as large as the images, with angleX and angleY in place of fx fy cx
-    /// cy.
+    /// In our axes. Width 0: as large as the images; see cameraOf().
     Camera camera;
-    double angleX = 0, angleY = 0;  ///< radians; angleY 0 = square pixels
+    Pinhole told;  ///< what the set says of a camera without a size
     Lens lens;
     /// Of depth that a camera of its own took, in our axes, without lens; width 0: as large as the
     /// depth.
@@ -108,6 +107,16 @@ struct SetView {
     bool background = false;                  ///< see ReferenceView::background
     bool absent = false;    ///< its camera has no picture yet: what it sees is not known
     std::string exactName;  ///< where `name` had to be changed to be a file's; else empty
+
+    /// The camera; one without a size as one of images of this size.
+    [[nodiscard]] Camera cameraOf(glm::ivec2 size) const {
+        Camera out = camera;
+        if (out.width > 0) return out;
+        out.width = size.x;
+        out.height = size.y;
+        told.fill(out);
+        return out;
+    }
 };
 
 struct SetDescription {

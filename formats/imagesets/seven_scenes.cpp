@@ -126,7 +126,7 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
             view.depthCamera = cameraBeside(v, *depth);
         }
         view.camera = cameraFromVision(v);
-        view.distances = sensorIntegers(unitOf(options, kMillimetre));
+        view.distances = sensorsOrFloats(options, kMillimetre);
         view.sensor = true;
         set.views.push_back(std::move(view));
     }

@@ -67,15 +67,7 @@ Result<ImageSetSummary> summariseImageSet(const std::filesystem::path& path, Job
         }
         // Blender's files have an angle only.
         if (out.camera.width == 0 && !view.texture.missing && !view.texture.path.empty()) {
-            if (const auto size = imageSizeOf(view.texture, job)) {
-                out.camera.width = size->x;
-                out.camera.height = size->y;
-                out.camera.fx = size->x * 0.5 / std::tan(view.angleX * 0.5);
-                out.camera.fy =
-                    view.angleY > 0 ? size->y * 0.5 / std::tan(view.angleY * 0.5) : out.camera.fx;
-                out.camera.cx = size->x * 0.5;
-                out.camera.cy = size->y * 0.5;
-            }
+            if (const auto size = imageSizeOf(view.texture, job)) out.camera = view.cameraOf(*size);
         }
         summary.views.push_back(std::move(out));
     }

@@ -7,16 +7,25 @@
 #include "lib/base/whole_number.hpp"
 
 namespace stx::imagesets {
+namespace {
+
+constexpr std::string_view kSpaces = " \t\r,";
+
+}  // namespace
 
 std::vector<std::string_view> TextLine::words() const {
     std::vector<std::string_view> out;
-    constexpr std::string_view kSpaces = " \t\r,";
     for (std::size_t at = 0;;) {
         const std::size_t from = text.find_first_not_of(kSpaces, at);
         if (from == std::string_view::npos) return out;
         at = std::min(text.find_first_of(kSpaces, from), text.size());
         out.push_back(text.substr(from, at - from));
     }
+}
+
+std::string_view TextLine::lastWord() const {
+    const std::string_view upTo = text.substr(0, text.find_last_not_of(kSpaces) + 1);
+    return upTo.substr(upTo.find_last_of(kSpaces) + 1);
 }
 
 std::vector<TextLine> linesOf(std::string_view text, bool all) {

@@ -16,6 +16,8 @@ struct TextLine {
     [[nodiscard]] std::string where() const { return "line " + std::to_string(number); }
     /// The words between spaces, tabs and commas.
     [[nodiscard]] std::vector<std::string_view> words() const;
+    /// The last of them, empty where there is none: for lines of many thousands.
+    [[nodiscard]] std::string_view lastWord() const;
 };
 
 /// Lines without their ends; those that begin with # or are blank are left out, unless `all`.

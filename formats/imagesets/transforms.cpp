@@ -61,9 +61,41 @@ Result<void> setLens(const Json& file, const Json& frame, const std::string& whe
     return {};
 }
 
+/// Of one axis, 'x' or 'y'.
+Result<Focal> focalOf(const Json& from, char axis, const std::string& where) {
+    const std::string pixels = fmt::format("fl_{}", axis);
+    const std::string angle = fmt::format("camera_angle_{}", axis);
+    Focal out;
+    STX_TRY(out.pixels, findNumber(from, pixels.c_str(), where));
+    STX_TRY(out.angle, findNumber(from, angle.c_str(), where));
+    if (out.pixels && !(*out.pixels > 0))
+        return failAt(where, ErrorCode::invalidInput, "'{}' is {:g}; it must be above 0", pixels,
+                      *out.pixels);
+    if (out.angle && !(*out.angle > 0 && *out.angle < 3.14159))
+        return failAt(where, ErrorCode::invalidInput,
+                      "'{}' is {:g}; an angle between 0 and pi is expected", angle, *out.angle);
+    return out;
+}
+
+Result<Pinhole> pinholeOf(const Json& file, const Json& frame, const std::string& where) {
+    Pinhole out;
+    STX_TRY(out.x, focalOf(frame, 'x', where));
+    STX_TRY(out.y, focalOf(frame, 'y', where));
+    STX_TRY(const Focal x, focalOf(file, 'x', where));
+    STX_TRY(const Focal y, focalOf(file, 'y', where));
+    // Where both say one along x, the file's along y is not of the frame's lens.
+    if (!out.y.said() && !(out.x.said() && x.said())) out.y = y;
+    if (!out.x.said()) out.x = x;
+    STX_TRY(out.cx, find(file, frame, "cx", where));
+    STX_TRY(out.cy, find(file, frame, "cy", where));
+    if (!out.x.said())
+        return failAt(where, ErrorCode::invalidInput,
+                      "neither 'fl_x' nor 'camera_angle_x' is given");
+    return out;
+}
+
 Result<void> setIntrinsics(const Json& file, const Json& frame, const std::string& where,
                            SetView& view) {
-    const auto get = [&](const char* key) { return find(file, frame, key, where); };
     STX_TRY(const std::string model, cameraModel(file, frame, where));
     const bool panorama = model == "EQUIRECTANGULAR";
     const bool orthographic = model == "ORTHOGRAPHIC";
@@ -78,8 +110,8 @@ Result<void> setIntrinsics(const Json& file, const Json& frame, const std::strin
                       model);
     Camera& c = view.camera;
     c.orthographic = orthographic;
-    STX_TRY(const auto w, get("w"));
-    STX_TRY(const auto h, get("h"));
+    STX_TRY(const auto w, find(file, frame, "w", where));
+    STX_TRY(const auto h, find(file, frame, "h", where));
     if (w.has_value() != h.has_value())
         return failAt(where, ErrorCode::invalidInput, "'{}' is missing beside '{}'", w ? "h" : "w",
                       w ? "w" : "h");
@@ -88,45 +120,18 @@ Result<void> setIntrinsics(const Json& file, const Json& frame, const std::strin
         STX_TRY(c.height, imageSide(*h, "h", 65535, where));
     }
     if (panorama) return {};
-    STX_TRY(const auto fx, get("fl_x"));
-    STX_TRY(const auto fy, get("fl_y"));
-    STX_TRY(const auto cx, get("cx"));
-    STX_TRY(const auto cy, get("cy"));
-    STX_TRY(const auto angleX, get("camera_angle_x"));
-    STX_TRY(const auto angleY, get("camera_angle_y"));
     STX_CHECK(setLens(file, frame, where, model == "OPENCV_FISHEYE", view.lens));
-    for (const auto& [angle, key] :
-         {std::pair{angleX, "camera_angle_x"}, std::pair{angleY, "camera_angle_y"}})
-        if (angle && !(*angle > 0 && *angle < 3.14159))
-            return failAt(where, ErrorCode::invalidInput,
-                          "'{}' is {:g}; an angle between 0 and pi is expected", key, *angle);
-    for (const auto& [focal, key] : {std::pair{fx, "fl_x"}, std::pair{fy, "fl_y"}})
-        if (focal && !(*focal > 0))
-            return failAt(where, ErrorCode::invalidInput, "'{}' is {:g}; it must be above 0", key,
-                          *focal);
-    if (!fx && !angleX)
-        return failAt(where, ErrorCode::invalidInput,
-                      "neither 'fl_x' nor 'camera_angle_x' is given");
-    if (c.width == 0) {
-        if (fx && cx && cy) {
-            // Old files leave out w and h where the principal point is the middle, or near it.
-            view.sizeGuessed = true;
-            c.width = static_cast<int>(std::lround(*cx * 2));
-            c.height = static_cast<int>(std::lround(*cy * 2));
-            if (c.width < 1 || c.height < 1 || c.width > 65535 || c.height > 65535)
-                return failAt(where, ErrorCode::invalidInput, "'w' and 'h' are missing");
-        } else if (fx) {
+    STX_TRY(view.told, pinholeOf(file, frame, where));
+    if (c.width == 0 && view.told.x.pixels) {
+        // Old files leave out w and h where the principal point is the middle, or near it.
+        const auto size = view.told.sizeAround();
+        if (!size)
             return failAt(where, ErrorCode::invalidInput, "'w' and 'h' are missing beside 'fl_x'");
-        } else {
-            view.angleX = *angleX;
-            view.angleY = angleY.value_or(0);
-            return {};
-        }
+        view.sizeGuessed = true;
+        c.width = size->x;
+        c.height = size->y;
     }
-    c.fx = fx ? *fx : c.width * 0.5 / std::tan(*angleX * 0.5);
-    c.fy = fy ? *fy : angleY ? c.height * 0.5 / std::tan(*angleY * 0.5) : c.fx;
-    c.cx = cx.value_or(c.width * 0.5);
-    c.cy = cy.value_or(c.height * 0.5);
+    if (c.width > 0) view.told.fill(c);
     return {};
 }
 

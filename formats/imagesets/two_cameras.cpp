@@ -43,11 +43,11 @@ Result<void> checkGiven(const char* option, const PixelIntrinsics& k) {
 
 }  // namespace
 
-PixelIntrinsics scaledTo(glm::ivec2 size, PixelIntrinsics ofKinect) {
-    if (!sameShape(size, kKinectSize)) return ofKinect;
-    const double scale = static_cast<double>(size.x) / kKinectSize.x;
+PixelIntrinsics scaledTo(glm::ivec2 size, PixelIntrinsics k, glm::ivec2 of) {
+    if (!sameShape(size, of)) return k;
+    const double scale = static_cast<double>(size.x) / of.x;
     const PixelIntrinsics corner(0, 0, 0.5, 0.5);
-    return (ofKinect + corner) * scale - corner;
+    return (k + corner) * scale - corner;
 }
 
 PixelIntrinsics usualIntrinsics(std::string_view from, PixelIntrinsics ofKinect, glm::ivec2 size,

@@ -18,11 +18,12 @@ using PixelIntrinsics = glm::dvec4;
 /// The picture that the usual intrinsics of a Kinect are of.
 inline constexpr glm::ivec2 kKinectSize{640, 480};
 
-/// Intrinsics of pictures of kKinectSize for pictures of that size: scaled where the shape is the
-/// same, else as they are.
-[[nodiscard]] PixelIntrinsics scaledTo(glm::ivec2 size, PixelIntrinsics ofKinect);
-/// The same, with a note of where they come from ("TUM's freiburg1 published ones are used"), and
-/// whether they can fit.
+/// Intrinsics of pictures of the size `of` for pictures of another size: scaled where the shape is
+/// the same, else as they are.
+[[nodiscard]] PixelIntrinsics scaledTo(glm::ivec2 size, PixelIntrinsics k,
+                                       glm::ivec2 of = kKinectSize);
+/// The same of kKinectSize, with a note of where they come from ("TUM's freiburg1 published ones
+/// are used"), and whether they can fit.
 [[nodiscard]] PixelIntrinsics usualIntrinsics(std::string_view from, PixelIntrinsics ofKinect,
                                               glm::ivec2 size, Job& job);
 

@@ -114,6 +114,42 @@ TEST(FilmPairs, CamerasMoveByTheirTimes) {
     EXPECT_EQ((*read)->frame(7, job)->views[0].camera.position.x, 2);
 }
 
+/// Of our cameras.json the film has the poses by their times, and what a step of depth is.
+TEST(FilmPairs, CamerasJsonSaysTimesAndUnits) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    writeFilms(folder);
+    const auto camera = [](double x, double time, const std::string& depth) {
+        return fmt::format(
+            R"({{"width":{},"height":{},"position":[{},0,0],"orientation":[0,1,0,0],)"
+            R"("fx":30,"time":{}{}}})",
+            kWidth, kHeight, x, time, depth);
+    };
+    const auto open = [&](const std::string& depth, Job& job) {
+        sets::writeText(folder / "camera.json", "{\"cameras\":[" + camera(1, 0, depth) + "," +
+                                                    camera(2, 0.13, depth) + "]}");
+        return openImageSet(folder / "camera.json", filmOptions(), job);
+    };
+    Job job;
+    const auto read = open(",\"depthUnit\":0.002", job);
+    ASSERT_TRUE(read) << read.error().text();
+    const int code = films::code(9, 9, 2, 4000);
+    for (const int k : {1, 2, 7}) {
+        const auto frame = (*read)->frame(static_cast<std::size_t>(k), job);
+        ASSERT_TRUE(frame) << frame.error().text();
+        EXPECT_EQ(frame->views[0].camera.position.x, k == 1 ? 1 : 2);
+    }
+    EXPECT_NEAR((*read)->frame(2, job)->views[0].depth.at(9, 9), code * 0.002, 8.0 / 65534);
+    // The code of DepthImage: 1 is far, the largest near.
+    const auto planes = open(",\"nearPlane\":1,\"farPlane\":3", job);
+    ASSERT_TRUE(planes) << planes.error().text();
+    EXPECT_NEAR((*planes)->frame(2, job)->views[0].depth.at(9, 9),
+                1 + (1 - (code - 1) / 65534.0) * 2, 1e-4);
+    const auto untold = open("", job);
+    ASSERT_FALSE(untold);
+    EXPECT_NE(untold.error().text().find("--depth-unit"), std::string::npos);
+}
+
 TEST(FilmPairs, FramesAreMatchedByTime) {
     REQUIRE_VIDEO();
     const TemporaryFolder folder;

@@ -92,6 +92,29 @@ TEST(Colmap, CutShortAndUnknownModelsAreErrors) {
     expectError(readSet(folder.path()), {"cameras.bin", "FULL_OPENCV", "PINHOLE"});
 }
 
+/// Else every second image would be taken for the points of the one before.
+TEST(Colmap, ImagesWithoutTheirLinesOfPointsAreAnError) {
+    const auto views = roomViews();
+    TemporaryFolder folder;
+    writeColmap(folder.path(), views, false);
+    const auto file = folder / "sparse/images.txt";
+    const auto bytes = readFile(file, {});
+    ASSERT_TRUE(bytes);
+    std::string text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    const auto replaced = [&](const std::string& by) {
+        std::string other = text;
+        for (std::size_t at = 0; (at = other.find(".png\n\n", at)) != std::string::npos;)
+            other.replace(at, 6, ".png\n" + by);
+        writeText(file, other);
+        return readSet(folder.path(), keepAll());
+    };
+    const auto with = replaced("12.5 7.25 -1 3 4 88 \r\n");
+    ASSERT_TRUE(with) << with.error().text();
+    EXPECT_EQ(with->views.size(), 2u);
+    expectError(replaced(""), {"images.txt", "line 3", "'v1.png' where a line of points",
+                               "'X Y POINT3D_ID'", "may be empty"});
+}
+
 /// A camera by which no image was taken may be of any model; sparse/ is a name of the model, too.
 TEST(Colmap, OnlyCamerasInUseMatter) {
     const auto views = roomViews(1);

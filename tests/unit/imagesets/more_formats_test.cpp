@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/imagesets/camera_file.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
 using namespace stx;
@@ -151,6 +152,19 @@ TEST(Miv, YuvFramesAndSizesThatDoNotFit) {
                   glm::u8vec4(85 * frame, 85 * frame, 85 * frame, 255));
         EXPECT_NEAR(read->views[0].depth.at(3, 2), mivDepth(20000 + 1000 * frame), 1e-5);
     }
+    // A mask for each frame: of frame k the first k + 1 rows.
+    ImageSetOptions masked;
+    masked.maskPattern = "mask_{frame:03}.png";
+    for (int frame = 0; frame < 3; ++frame)
+        writeCodes(folder / fmt::format("mask_{:03}.png", frame), w, h, 8,
+                   [&](int, int y) { return y <= frame ? 255 : 0; });
+    const auto film = openImageSet(folder.path(), masked, job);
+    ASSERT_TRUE(film) << film.error().text();
+    for (int frame = 0; frame < 3; ++frame) {
+        const auto shown = (*film)->frame(static_cast<std::size_t>(frame), job);
+        ASSERT_TRUE(shown) << shown.error().text();
+        EXPECT_EQ(shown->views[0].pointCount(), w * (frame + 1));
+    }
     ImageSetOptions options;
     options.frame = 3;
     expectError(readSet(folder.path(), options), {"frame 3", "3"});
@@ -201,6 +215,31 @@ TEST(CamerasJson, DepthImageCodesComeBackAndUnlikeSizesAreResampled) {
     expectError(readSet(folder.path()), {"d.png", "depthUnit"});
     json(",\"nearPlane\":40,\"farPlane\":0.1");
     expectError(readSet(folder.path()), {"cameras[0]", "nearPlane"});
+}
+
+/// Times of its poses are for films and paths of cameras.
+TEST(CamerasJson, IsOfOneMomentWhateverItsTimes) {
+    const auto views = roomViews(2, 24, 16);
+    TemporaryFolder folder;
+    std::string cameras;
+    for (int i = 0; i < 2; ++i) {
+        writeColour(folder / fmt::format("t{}.png", i), views[i]);
+        writeCodes(folder / fmt::format("d{}.png", i), 24, 16, 16, [](int, int) { return 2000; });
+        cameras +=
+            fmt::format(R"({}{{"texture":"t{}.png","depth":"d{}.png","width":24,"height":16,)"
+                        R"("position":[{},0,0],"orientation":[0,1,0,0],"fx":20,"time":{},)"
+                        R"("depthUnit":0.001}})",
+                        i ? "," : "", i, i, i, 0.5 * i);
+    }
+    writeText(folder / "cameras.json", "{\"cameras\":[" + cameras + "]}");
+    Job job;
+    const auto set = openImageSet(folder.path(), {}, job);
+    ASSERT_TRUE(set) << set.error().text();
+    EXPECT_FALSE((*set)->timeline().moves());
+    EXPECT_EQ((*set)->frame(0, job)->views.size(), 2u);
+    const auto named = readCameraFile(folder / "cameras.json", job);
+    ASSERT_TRUE(named) << named.error().text();
+    EXPECT_EQ(named->at(1).time, 0.5);
 }
 
 TEST(ExrSet, PartsOfTheirOwnAndDataWindowsAndCamerasFromAttributes) {

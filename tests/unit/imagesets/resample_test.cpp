@@ -27,7 +27,7 @@ Camera coarseCamera() {
 /// a plane is linear in 1 / distance, too.
 Lens skewed() {
     Lens lens;
-    lens.skew = 1.5;
+    lens.skew = 1.5 / coarseCamera().fx;
     return lens;
 }
 

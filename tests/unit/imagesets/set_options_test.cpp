@@ -108,6 +108,25 @@ TEST(SetOptions, AUnitIsOfAllIntegersInSteps) {
     }
 }
 
+/// Arrays of floats are scene units in recordings, too, whose integers count steps.
+TEST(SetOptions, FloatsOfRecordingsAreDistances) {
+    for (const std::string kind : {"tum", "open3d"}) {
+        SCOPED_TRACE(kind);
+        const TemporaryFolder folder;
+        writeWall(folder, kind);
+        const std::string depth = kind == "tum" ? "depth/1" : "depth/0";
+        std::filesystem::remove(folder / (depth + ".png"));
+        writeExr(folder / (depth + ".exr"), {{"Z", plane(24, 16, [](int, int) { return 2; })}});
+        if (kind == "tum") writeText(folder / "depth.txt", "1 depth/1.exr\n");
+        ImageSetOptions options = optionsOf(kind);
+        const auto read = readSet(folder.path(), options);
+        ASSERT_TRUE(read) << read.error().text();
+        EXPECT_EQ(read->views[0].depth.at(9, 9), 2);
+        options.depthUnit = 0.001;
+        expectError(readSet(folder.path(), options), {depth.c_str(), "--depth-unit", "floats"});
+    }
+}
+
 TEST(SetOptions, AUnitIsNotOfOtherCodes) {
     const TemporaryFolder folder;
     writeWall(folder, "transforms");
@@ -226,6 +245,76 @@ TEST(UsualIntrinsics, OfAnotherShapeCannotFit) {
         ASSERT_TRUE(read.bundle) << read.bundle.error().text();
         EXPECT_NE(read.notes.find("cannot fit 480x480"), std::string::npos) << read.notes;
     }
+}
+
+namespace {
+
+/// The camera of a wall whose intrinsics are in a file of that text.
+Result<Camera> cameraTold(const std::string& kind, const std::string& text,
+                          std::vector<std::string>* notes = nullptr) {
+    const TemporaryFolder folder;
+    writeWall(folder, kind);
+    writeText(folder / (kind == "tum" ? "intrinsics.txt" : "camera.json"), text);
+    Job job;
+    auto read = readImageSet(folder.path(), optionsOf(kind), job);
+    if (notes) *notes = job.takeNotes();
+    if (!read) return tl::unexpected(read.error());
+    return read->views[0].camera;
+}
+
+/// What cannot be told from one of 9 numbers is refused by name.
+void expectNoCamera(const std::string& kind, const std::string& text, const char* part) {
+    const auto camera = cameraTold(kind, text);
+    ASSERT_FALSE(camera) << text;
+    EXPECT_EQ(camera.error().code, ErrorCode::invalidInput);
+    EXPECT_NE(camera.error().text().find(part), std::string::npos) << camera.error().text();
+}
+
+}  // namespace
+
+TEST(Intrinsics, NineNumbersOfTumAreAMatrixOrALens) {
+    const auto matrix = cameraTold("tum", "20 0 11.5\n0 21 7.5\n0 0 1\n");
+    ASSERT_TRUE(matrix) << matrix.error().text();
+    EXPECT_EQ(glm::dvec4(matrix->fx, matrix->fy, matrix->cx, matrix->cy),
+              glm::dvec4(20, 21, 12, 8));
+    std::vector<std::string> notes;
+    const auto lens = cameraTold("tum", "20 21 11.5 7.5 0.1 -0.2 0.01 -0.02 0.3\n", &notes);
+    ASSERT_TRUE(lens) << lens.error().text();
+    EXPECT_EQ(glm::dvec4(lens->fx, lens->fy, lens->cx, lens->cy), glm::dvec4(20, 21, 12, 8));
+    // By the formula of lens.hpp with k1 k2 p1 p2 k3, of all pixels.
+    ASSERT_FALSE(notes.empty());
+    EXPECT_NE(notes[0].find("lens distortion of up to 1.23 pixels"), std::string::npos) << notes[0];
+    const char* no = "9 numbers that are no camera; 'fx fy cx cy'";
+    expectNoCamera("tum", "20 0 0 0 21 0 11.5 7.5 1", no);    // by columns
+    expectNoCamera("tum", "20 0.5 11.5 0 21 7.5 0 0 1", no);  // with a skew
+    expectNoCamera("tum", "20 0 11.5 1 0 7.5 0 0 1", no);
+    expectNoCamera("tum", "20 21 11.5 7.5 0.1", "5 numbers that are no camera");
+}
+
+TEST(Intrinsics, OfOpen3dAreAMatrixByColumnsOfPicturesOfASize) {
+    const auto json = [](const std::string& size, const std::string& m) {
+        return fmt::format(R"({{{}"intrinsic_matrix":[{}]}})", size, m);
+    };
+    const std::string columns = "20,0,0,0,21,0,11.5,7.5,1";
+    std::vector<std::string> notes;
+    const auto own = cameraTold("open3d", json(R"("width":24,"height":16,)", columns), &notes);
+    ASSERT_TRUE(own) << own.error().text();
+    EXPECT_EQ(glm::dvec4(own->fx, own->fy, own->cx, own->cy), glm::dvec4(20, 21, 12, 8));
+    EXPECT_TRUE(notes.empty()) << notes[0];
+    const auto scaled = cameraTold("open3d", json(R"("width":48,"height":32,)", columns), &notes);
+    ASSERT_TRUE(scaled) << scaled.error().text();
+    EXPECT_EQ(glm::dvec4(scaled->fx, scaled->fy, scaled->cx, scaled->cy),
+              glm::dvec4(10, 10.5, 6, 4));
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("scaled from 48x32 to the pictures' 24x16 (fx 10, fy 10.5, cx 5.5, cy "
+                            "3.5)"),
+              std::string::npos)
+        << notes[0];
+    expectNoCamera("open3d", json(R"("width":24,"height":24,)", columns), "24x24");
+    expectNoCamera("open3d", json(R"("width":24,)", columns), "'height' is missing");
+    expectNoCamera("open3d", json("", "20,0,11.5,0,21,7.5,0,0,1"), "a matrix by columns");
+    expectNoCamera("open3d", json("", "20,0,0,0,21,0,11.5,7.5"), "9 finite numbers");
+    expectNoCamera("open3d", json("", "20,0,0,0,0,0,11.5,7.5,1"), "20 and 0");
 }
 
 TEST(Intrinsics, OnesThatCannotBeACamerasAreTold) {

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "formats/imagesets/camera_file.hpp"
+#include "formats/imagesets/kinds.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
 using namespace stx;
@@ -63,6 +65,87 @@ TEST(TransformsTraps, AnglesAndIntrinsicsOfAFrameOfItsOwn) {
     EXPECT_EQ(a.cx, 48);
     EXPECT_EQ(a.cy, 32);
     EXPECT_EQ(glm::dvec4(b.fx, b.fy, b.cx, b.cy), glm::dvec4(70, 71, 40, 30));
+}
+
+TEST(TransformsTraps, AnglesHavePrincipalPointsToo) {
+    TemporaryFolder folder;
+    writeColour(folder / "a.png", roomViews(1)[0]);
+    writeCodes(folder / "d.png", 96, 64, 16, [](int, int) { return 2000; });
+    const std::string frame = transformsFrame(glm::dmat4(1), ",\"depth_file_path\":\"d.png\"");
+    writeText(
+        folder / "transforms.json",
+        "{\"camera_angle_x\":0.8,\"fl_y\":90,\"cx\":30,\"cy\":40.5,\"frames\":[" + frame + "]}");
+    const auto read = readSet(folder.path());
+    ASSERT_TRUE(read) << read.error().text();
+    const Camera& c = read->views[0].camera;
+    EXPECT_NEAR(c.fx, 48 / std::tan(0.4), 1e-9);
+    EXPECT_EQ(glm::dvec3(c.fy, c.cx, c.cy), glm::dvec3(90, 30, 40.5));
+    // Without pictures the principal point is taken for the middle.
+    Job job;
+    const auto cameras = readCameraFile(folder / "transforms.json", job);
+    ASSERT_TRUE(cameras) << cameras.error().text();
+    const Camera& alone = cameras->at(0).camera;
+    EXPECT_EQ(glm::ivec2(alone.width, alone.height), glm::ivec2(60, 81));
+    EXPECT_NEAR(alone.fx, 30 / std::tan(0.4), 1e-9);
+    EXPECT_EQ(glm::dvec3(alone.fy, alone.cx, alone.cy), glm::dvec3(90, 30, 40.5));
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("size; 60x81 is used"), std::string::npos) << notes[0];
+}
+
+TEST(TransformsTraps, AFramesOwnFocalLengthComesBeforeTheFiles) {
+    TemporaryFolder folder;
+    writeColour(folder / "a.png", roomViews(1)[0]);
+    writeCodes(folder / "d.png", 96, 64, 16, [](int, int) { return 2000; });
+    const auto camerasOf = [&](const std::string& file, const std::string& frame) {
+        writeText(folder / "transforms.json",
+                  "{\"w\":96,\"h\":64," + file + "\"frames\":[" +
+                      transformsFrame(glm::dmat4(1), ",\"depth_file_path\":\"d.png\"" + frame) +
+                      "]}");
+        const auto read = readSet(folder.path());
+        EXPECT_TRUE(read) << read.error().text();
+        return read ? glm::dvec2(read->views[0].camera.fx, read->views[0].camera.fy)
+                    : glm::dvec2(0);
+    };
+    const double fx = 48 / std::tan(0.4);
+    const std::string both = "\"fl_x\":70,\"fl_y\":71,";
+    const glm::dvec2 square = camerasOf(both, ",\"camera_angle_x\":0.8");
+    EXPECT_NEAR(square.x, fx, 1e-9);
+    EXPECT_NEAR(square.y, fx, 1e-9);
+    const glm::dvec2 upright = camerasOf(both, ",\"camera_angle_y\":0.8");
+    EXPECT_EQ(upright.x, 70);
+    EXPECT_NEAR(upright.y, 32 / std::tan(0.4), 1e-9);
+    EXPECT_EQ(camerasOf(both, ",\"fl_x\":80,\"camera_angle_x\":0.8"), glm::dvec2(80, 80));
+    EXPECT_EQ(camerasOf("\"fl_y\":71,", ",\"fl_x\":80"), glm::dvec2(80, 71));
+}
+
+/// As at the end of nerfstudio's _generate_dataparser_outputs(): poses are s * T * p, and written
+/// are T * A and s * a, with A and a of the transforms.json.
+TEST(TransformsTraps, NerfstudiosScaleHoldsTheAppliedOne) {
+    const glm::dvec3 p(1, 2, 3), t(0.5, -2, 3), shift(7, 0, -1);
+    const double s = 0.25, a = 4;
+    imagesets::SetView view;
+    view.camera = Camera::fromFieldOfView(s * (p + t), {1, 0, 0, 0}, {1, 0.8}, false, 16, 12);
+    const auto matrix = [](const glm::dvec3& move) {
+        glm::dmat4 m(1);
+        m[3] = glm::dvec4(move, 1);
+        return imagesets::Json::parse(rowsOf(m));
+    };
+    const imagesets::Json dataparser = {{"transform", matrix(t + shift)}, {"scale", s * a}};
+    imagesets::Json transforms = {{"applied_transform", matrix(shift)}, {"applied_scale", a}};
+    Job job;
+    std::vector<imagesets::SetView> views{view};
+    ASSERT_TRUE(imagesets::undoDataparser(dataparser, &transforms, views, job));
+    EXPECT_LT(glm::length(views[0].camera.position - p), 1e-12);
+    transforms.erase("applied_transform");
+    views = {view};
+    const imagesets::Json unmoved = {{"transform", matrix(t)}, {"scale", s * a}};
+    ASSERT_TRUE(imagesets::undoDataparser(unmoved, &transforms, views, job));
+    EXPECT_LT(glm::length(views[0].camera.position - p), 1e-12);
+    transforms["applied_scale"] = 0;
+    const auto wrong = imagesets::undoDataparser(dataparser, &transforms, views, job);
+    ASSERT_FALSE(wrong);
+    EXPECT_EQ(wrong.error().text(), "transforms.json: 'applied_scale' is 0; it must be above 0");
 }
 
 TEST(TransformsTraps, RotationThatIsNotQuiteOneIsRepairedAndItsSizeTold) {
@@ -224,31 +307,43 @@ TEST(ColmapTraps, EachLensModelIsUndoneToAThousandthOfAPixel) {
 }
 
 TEST(CamerasTraps, SkewIsRemovedAndItsSizeTold) {
-    TemporaryFolder folder;
-    writePositions(folder / "t.exr", 96, 64);
-    writeCodes(folder / "d.png", 96, 64, 16, [](int, int) { return 2000; });
-    writeText(folder / "cameras.json",
-              "{\"cameras\":[{\"texture\":\"t.exr\",\"depth\":\"d.png\",\"width\":96,\"height\":64,"
-              "\"position\":[0,0,0],\"quaternion\":[0,0,0,1],\"fx\":80,\"fy\":82,\"cx\":50,"
-              "\"cy\":30,\"depthUnit\":0.001,\"skew\":2.5}]}");
-    Job job;
-    const auto read = readImageSet(folder.path(), {}, job);
-    ASSERT_TRUE(read) << read.error().text();
-    const auto notes = job.takeNotes();
-    ASSERT_FALSE(notes.empty());
-    // Largest at the lower edge: 2.5 * (64 - 30) / 82.
-    EXPECT_NE(notes[0].find("skew of up to 1.04 pixels"), std::string::npos) << notes[0];
-    int checked = 0;
-    for (int y = 0; y < 64; ++y)
-        for (int x = 0; x < 96; ++x) {
-            if (read->views[0].texture.at(x, y).a < 1) continue;
-            const double at = x + 0.5 + 2.5 * (y + 0.5 - 30) / 82;
-            if (at < 2 || at > 94) continue;
-            ASSERT_NEAR(read->views[0].texture.at(x, y).x, at, 1e-3);
-            ASSERT_NEAR(read->views[0].texture.at(x, y).y, y + 0.5, 1e-3);
-            ++checked;
-        }
-    EXPECT_GT(checked, 5000);
+    // The picture as it is, and half as large, as its depth is.
+    for (const int shrunk : {1, 2}) {
+        SCOPED_TRACE(shrunk);
+        const int w = 96 / shrunk, h = 64 / shrunk;
+        TemporaryFolder folder;
+        writePositions(folder / "t.exr", 96, 64);
+        writeCodes(folder / "d.png", w, h, 16, [](int, int) { return 2000; });
+        writeText(
+            folder / "cameras.json",
+            "{\"cameras\":[{\"texture\":\"t.exr\",\"depth\":\"d.png\",\"width\":96,\"height\":64,"
+            "\"position\":[0,0,0],\"quaternion\":[0,0,0,1],\"fx\":80,\"fy\":82,\"cx\":50,"
+            "\"cy\":30,\"depthUnit\":0.001,\"skew\":2.5}]}");
+        ImageSetOptions options;
+        options.refine.set(RefineStep::raise, false);
+        Job job;
+        const auto read = readImageSet(folder.path(), options, job);
+        ASSERT_TRUE(read) << read.error().text();
+        std::string notes;
+        for (const std::string& note : job.takeNotes()) notes += note + "\n";
+        // Largest at the lower edge: 2.5 * (64 - 30) / 82.
+        EXPECT_NE(notes.find(shrunk == 1 ? "skew of up to 1.04 pixels" : "skew of up to 0.52"),
+                  std::string::npos)
+            << notes;
+        int checked = 0;
+        for (int y = 0; y < h; ++y)
+            for (int x = 0; x < w; ++x) {
+                const glm::vec4 colour = read->views[0].texture.at(x, y);
+                if (colour.a < 1) continue;
+                const glm::dvec2 p(shrunk * (x + 0.5), shrunk * (y + 0.5));
+                const double at = p.x + 2.5 * (p.y - 30) / 82;
+                if (at < 4 || at > 92 || p.y < 4 || p.y > 60) continue;
+                ASSERT_NEAR(colour.x, at, 1e-3);
+                ASSERT_NEAR(colour.y, p.y, 1e-3);
+                ++checked;
+            }
+        EXPECT_GT(checked, 4500 / shrunk / shrunk);
+    }
 }
 
 TEST(MivTraps, FarOfAThousandIsInfinity) {

@@ -293,6 +293,25 @@ TEST(MovingSets, TimesThatRoundToOneAreOneMoment) {
     EXPECT_EQ(sequence->timeline().count(), 2u);
 }
 
+/// 0.1 * 3 and 0.3 are one moment, of which two cameras have a picture each.
+TEST(MovingSets, TimesThatDifferInTheirLastBitAreOneMoment) {
+    for (const bool named : {false, true}) {
+        TemporaryFolder folder;
+        std::vector<Shot> shots;
+        for (int i = 1; i < 5; ++i) {
+            shots.push_back({named ? "a" : "", 0.1 * i, 0.01 * i, 2 * i});
+            shots.push_back({named ? "b" : "", i / 10.0, 5 + 0.01 * i, 2 * i + 1});
+        }
+        const auto sequence = opened(writeShots(folder, shots));
+        ASSERT_TRUE(sequence);
+        ASSERT_EQ(sequence->timeline().count(), 4u);
+        for (std::size_t k = 0; k < 4; ++k) {
+            EXPECT_NEAR(depthOf(*sequence, k, 0), 1.002 + 0.002 * k, 1e-4);
+            EXPECT_NEAR(depthOf(*sequence, k, 1), 1.003 + 0.002 * k, 1e-4);
+        }
+    }
+}
+
 TEST(MovingSets, PicturesOfOnePoseAreOneCamera) {
     TemporaryFolder folder;
     const auto set =
@@ -314,6 +333,37 @@ TEST(MovingSets, WhereNoPoseComesTwiceOneCameraMoves) {
     ASSERT_TRUE(last);
     ASSERT_EQ(last->views.size(), 1u);
     EXPECT_DOUBLE_EQ(last->views[0].camera.position.x, 7);
+}
+
+TEST(MovingSets, ARecordingIsOfOneCameraEvenWhereItRests) {
+    TemporaryFolder folder;
+    std::string pictures, poses;
+    const double x[] = {0, 0, 0.01, 0.02};
+    for (int i = 0; i < 4; ++i) {
+        const std::vector<std::uint8_t> rgb(8 * 6 * 3, 90);
+        const std::vector<std::uint16_t> depth(8 * 6, static_cast<std::uint16_t>(5000 * (1 + i)));
+        writeBytes(folder / fmt::format("c{}.png", i), *encodePng(8, 6, 3, 8, rgb.data(), true));
+        writeBytes(folder / fmt::format("d{}.png", i),
+                   *encodePng(8, 6, 1, 16, depth.data(), false));
+        pictures += fmt::format("{0} c{1}.png {0} d{1}.png\n", 1 + 0.1 * i, i);
+        poses += fmt::format("{} {} 0 0 0 0 0 1\n", 1 + 0.1 * i, x[i]);
+    }
+    writeText(folder / "associations.txt", pictures);
+    writeText(folder / "groundtruth.txt", poses);
+    writeText(folder / "intrinsics.txt", "8 8 3.5 2.5\n");
+    ImageSetOptions options;
+    options.moving = true;
+    const auto sequence = opened(folder.path(), options);
+    ASSERT_TRUE(sequence);
+    ASSERT_EQ(sequence->timeline().count(), 4u);
+    Job job;
+    for (std::size_t k = 0; k < 4; ++k) {
+        const auto frame = sequence->frame(k, job);
+        ASSERT_TRUE(frame) << frame.error().text();
+        ASSERT_EQ(frame->views.size(), 1u);
+        EXPECT_DOUBLE_EQ(frame->views[0].camera.position.x, x[k]);
+        EXPECT_NEAR(frame->views[0].depth.at(3, 3), 1.0 + k, 1e-4);
+    }
 }
 
 TEST(MovingSets, StillTakesAllPicturesAsViews) {
@@ -370,6 +420,9 @@ TEST(MovingSets, BrokenTimesAreErrors) {
     };
     EXPECT_NE(messageOf({{"a", 0, 0, 0}, {"a", 1, 0, 0}, {"a", 1, 0, 0}})
                   .find("are both of camera 'a' at 1 s"),
+              std::string::npos);
+    EXPECT_NE(messageOf({{"a", 0, 0, 0}, {"a", 0.3, 0, 0}, {"a", 0.1 * 3, 0, 0}})
+                  .find("are both of camera 'a' at 0.3 s"),
               std::string::npos);
     EXPECT_NE(messageOf({{"a", 0, 0, 0}, {"a", 1, 0, 0}}, "\"time\":1,", "")
                   .find("1 of 2 pictures have a 'time'"),
