@@ -15,6 +15,7 @@
 #include "formats/mpeg4/text/text_values.hpp"
 #include "formats/mpeg4/text/xmt.hpp"
 #include "lib/geometry/directions.hpp"
+#include "lib/model/from_origin.hpp"
 
 namespace stx {
 
@@ -232,7 +233,12 @@ Result<void> writeMpeg4Views(const ViewTable& table, const std::filesystem::path
                              const SceneWriteOptions& scene, const Mpeg4WriteOptions& options) {
     std::optional<PictureSpool> spool;
     if (path != "-") STX_SET(spool, PictureSpool::create(folderOf(path)));
-    STX_TRY(const auto document, sceneFromViews(table, scene, spool ? &*spool : nullptr, job));
+    const glm::dvec3 origin = originOf(table);
+    noteOrigin(origin, table.about(), job);
+    std::unique_ptr<ViewTable> moved;
+    if (origin != table.about().origin) moved = countedFrom(origin, table);
+    STX_TRY(const auto document,
+            sceneFromViews(moved ? *moved : table, scene, spool ? &*spool : nullptr, job));
     return writeMpeg4(document, path, job, options);
 }
 

@@ -46,7 +46,7 @@ struct Mpeg4WriteOptions {
 [[nodiscard]] Result<std::unique_ptr<ViewTable>> openMpeg4Views(const std::filesystem::path& path,
                                                                 Job& job);
 /// Views are encoded when they come, by way of a file beside the target. See
-/// mpeg4::sceneFromViews().
+/// mpeg4::sceneFromViews(). Coordinates that floats would round count from an origin (originOf()).
 [[nodiscard]] Result<void> writeMpeg4Views(const ViewTable& table,
                                            const std::filesystem::path& path, Job& job,
                                            const mpeg4::SceneWriteOptions& scene = {},

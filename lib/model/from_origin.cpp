@@ -1,10 +1,12 @@
 #include "lib/model/from_origin.hpp"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
 #include "lib/geometry/frustum.hpp"
 #include "lib/geometry/origin.hpp"
+#include "lib/model/views_over.hpp"
 
 namespace stx {
 namespace {
@@ -24,28 +26,49 @@ Bounds boxOfViews(const std::vector<ReferenceView>& views, bool planesKnown) {
     return box;
 }
 
-/// Of a bundle or an atlas.
+/// What to subtract from the coordinates of a bundle or an atlas.
 template <class Model>
-glm::dvec3 originOf(const Model& model, bool planesKnown) {
+glm::dvec3 nearOrigin(const Model& model, bool planesKnown) {
     return originFor(model.bounds && !model.bounds->empty() ? *model.bounds
                                                             : boxOfViews(model.views, planesKnown));
-}
-
-/// All but the cameras.
-template <class Model>
-void moveBounds(Model& model, const glm::dvec3& by) {
-    model.origin += by;
-    if (!model.bounds || model.bounds->empty()) return;
-    model.bounds->min -= by;
-    model.bounds->max -= by;
 }
 
 template <class Model>
 void move(Model& model, const glm::dvec3& by) {
     if (by == glm::dvec3(0.0)) return;
+    model.origin += by;
     for (ReferenceView& view : model.views) view.camera.position -= by;
-    moveBounds(model, by);
+    if (!model.bounds || model.bounds->empty()) return;
+    model.bounds->min -= by;
+    model.bounds->max -= by;
 }
+
+/// Views of a table that are read when they are asked for, from another origin.
+class MovedViews : public ViewsOver {
+  public:
+    /// `own`: as ViewsOver has it.
+    MovedViews(const ViewTable& table, std::unique_ptr<ViewTable> own, const glm::dvec3& by)
+        : ViewsOver(table, std::move(own), headersOf(table.about()), table.kinds(),
+                    planesOf(table)),
+          by_(by) {
+        move(about(), by);
+    }
+
+    std::uint64_t bytesToMake(std::size_t index) const override {
+        return std::max(table_.bytesToMake(index), bytesOf(index));
+    }
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
+        STX_TRY(auto read, table_.view(index, job));
+        auto view = toChange(std::move(read));
+        view->camera.position -= by_;
+        return view;
+    }
+
+  private:
+    glm::dvec3 by_;
+};
 
 class FromOrigin : public Sequence {
   public:
@@ -55,39 +78,19 @@ class FromOrigin : public Sequence {
     }
     Result<Bundle> frame(std::size_t index, Job& job) override {
         STX_TRY(auto bundle, frames_->frame(index, job));
-        move(bundle, offsetOf(bundle, true));
+        if (!origin_) origin_ = bundle.origin + nearOrigin(bundle, true);
+        move(bundle, *origin_ - bundle.origin);
         return bundle;
     }
     Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
         STX_TRY(auto table, frames_->views(index, job));
-        const glm::dvec3 by = offsetOf(std::as_const(*table).about(), table->planesKnown());
-        if (by == glm::dvec3(0.0)) return table;
-        if (table->whole()) {
-            STX_TRY(auto bundle, wholeBundle(std::move(table), job));
-            move(bundle, by);
-            return tableOf(std::move(bundle));
-        }
-        ViewChange change;
-        change.header = [by](ViewHeader& view) { view.camera.position -= by; };
-        change.change = [by](ReferenceView& view, Job&) -> Result<void> {
-            view.camera.position -= by;
-            return {};
-        };
-        change.takes = {"moving", 0};
-        auto moved = changedViews(std::move(table), std::move(change));
-        moveBounds(moved->about(), by);
-        return moved;
+        if (!origin_) origin_ = originOf(*table);
+        return countedFrom(*origin_, std::move(table));
     }
 
   private:
-    /// How far the origin of all frames, which is found once, is from that of this one.
-    glm::dvec3 offsetOf(const Bundle& about, bool planesKnown) {
-        if (!origin_) origin_ = about.origin + originOf(about, planesKnown);
-        return *origin_ - about.origin;
-    }
-
     std::unique_ptr<Sequence> frames_;
-    std::optional<glm::dvec3> origin_;
+    std::optional<glm::dvec3> origin_;  ///< of all frames, found once
 };
 
 }  // namespace
@@ -100,8 +103,24 @@ std::unique_ptr<Sequence> fromOrigin(std::unique_ptr<Sequence> frames, const glm
     return std::make_unique<FromOrigin>(std::move(frames), origin);
 }
 
+glm::dvec3 originOf(const ViewTable& table) {
+    return table.about().origin + nearOrigin(table.about(), table.planesKnown());
+}
+
+std::unique_ptr<ViewTable> countedFrom(const glm::dvec3& origin, std::unique_ptr<ViewTable> table) {
+    const glm::dvec3 by = origin - std::as_const(*table).about().origin;
+    if (by == glm::dvec3(0.0)) return table;
+    if (!table->whole()) return std::make_unique<MovedViews>(*table, std::move(table), by);
+    move(table->about(), by);
+    return table;
+}
+
+std::unique_ptr<ViewTable> countedFrom(const glm::dvec3& origin, const ViewTable& table) {
+    return std::make_unique<MovedViews>(table, nullptr, origin - table.about().origin);
+}
+
 void countFromOrigin(Atlas& atlas) {
-    move(atlas, originOf(atlas, true));
+    move(atlas, nearOrigin(atlas, true));
 }
 
 }  // namespace stx

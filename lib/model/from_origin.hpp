@@ -19,7 +19,18 @@ namespace stx {
 [[nodiscard]] std::unique_ptr<Sequence> fromOrigin(std::unique_ptr<Sequence> frames,
                                                    const glm::dvec3& origin);
 
-/// The same of an atlas of one model (objectOf()).
+/// From where fromOrigin() has these views count, in the world; their own origin where floats hold
+/// their coordinates well.
+[[nodiscard]] glm::dvec3 originOf(const ViewTable& table);
+
+/// The same views, which count from this origin. The second kind takes nothing: the table must
+/// outlive it.
+[[nodiscard]] std::unique_ptr<ViewTable> countedFrom(const glm::dvec3& origin,
+                                                     std::unique_ptr<ViewTable> table);
+[[nodiscard]] std::unique_ptr<ViewTable> countedFrom(const glm::dvec3& origin,
+                                                     const ViewTable& table);
+
+/// As fromOrigin(), of an atlas of one model (objectOf()).
 void countFromOrigin(Atlas& atlas);
 
 }  // namespace stx

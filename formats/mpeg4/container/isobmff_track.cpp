@@ -149,6 +149,7 @@ Result<void> readSampleEntry(const Box& stsd, const Box& dref, Mp4Track& track) 
         return damaged(stsd, "it has no sample entry; one is expected");
     STX_TRY(const auto boxes, childBoxes(entries));
     if (boxes.empty()) return damaged(stsd, "it announces {} sample entries and has none", count);
+    track.entries = boxes;
     Box entry = boxes.front();
     const Box whole = entry;
     track.facts.sampleEntry = entry.type;
@@ -357,6 +358,23 @@ class SampleSizes {
     std::uint8_t pair_ = 0;
 };
 
+/// Errors: (invalidInput) a sample entry that is not there, (unsupported) one that is not the first
+/// to the byte, by which all samples are decoded. A single entry serves whatever is named.
+Result<void> checkEntry(const Mp4Track& track, std::uint64_t chunk, std::uint32_t number) {
+    const std::vector<Box>& entries = track.entries;
+    if (entries.size() < 2) return {};
+    if (number == 0 || number > entries.size())
+        return damaged(track.stsc, "chunk {} is of sample entry {}, but there are {}", chunk,
+                       number, entries.size());
+    const Box &first = entries.front(), &own = entries[number - 1];
+    if (own.type == first.type && std::ranges::equal(own.body.restView(), first.body.restView()))
+        return {};
+    return failAt(track.stsc.place(), ErrorCode::unsupported,
+                  "chunk {} is of sample entry {} ('{}'), which is not the first ('{}') again; all "
+                  "samples of a track are decoded with one: code its pictures anew as one stream",
+                  chunk, number, printable(own.type), printable(first.type));
+}
+
 Result<void> place(const Mp4Track& track, SampleSizes sizes, const ByteSource& source,
                    std::vector<Sample>& samples) {
     std::uint64_t chunks = 0;
@@ -369,14 +387,14 @@ Result<void> place(const Mp4Track& track, SampleSizes sizes, const ByteSource& s
     std::uint32_t first = table.u32();
     if (first != 1) return damaged(track.stsc, "the first chunk is {}, not 1", first);
     std::uint32_t perChunk = table.u32();
-    table.u32();
+    STX_CHECK(checkEntry(track, 1, table.u32()));
     std::uint64_t nextRun = runs > 1 ? table.u32() : 0;
     std::uint64_t run = 1;
     std::uint64_t total = 0;
     for (std::uint64_t chunk = 1; chunk <= chunks && samples.size() < sizes.count(); ++chunk) {
         if (nextRun == chunk) {
             perChunk = table.u32();
-            table.u32();
+            STX_CHECK(checkEntry(track, chunk, table.u32()));
             ++run;
             const std::uint64_t after = run < runs ? table.u32() : 0;
             if (after != 0 && after <= chunk)

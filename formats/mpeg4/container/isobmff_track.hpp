@@ -37,6 +37,7 @@ struct Mp4Track {
     bool elsewhere = false;  ///< the data are in another file, which is not opened
     std::string path;
 
+    std::vector<Box> entries;                      ///< of samples; all that are used are alike
     Box stts, stsc, stsz, stco, ctts, stss, elst;  ///< type empty: not there
 };
 

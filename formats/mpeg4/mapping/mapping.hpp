@@ -118,6 +118,8 @@ struct SceneWriteOptions {
 /// too large; (usage) options out of range; what Bundle::check() says.
 [[nodiscard]] Result<Document> sceneFromBundle(const Bundle& bundle,
                                                const SceneWriteOptions& options, Job& job);
+/// Notes that views count from another origin than they did `before` (originOf()), if they do.
+void noteOrigin(const glm::dvec3& origin, const Bundle& before, Job& job);
 class PictureSpool;
 /// The same of views that are encoded when they come, into `spool`, or into memory when it is null.
 /// All views are in memory, and their pictures in the scene, of PointTexture and OctreeImage.

@@ -68,7 +68,7 @@ class BundleReader {
                 ReferenceView& view = (*read[i])[layer];
                 place(view, plans[i], object.notes, static_cast<int>(layer));
                 bundle.views.push_back(std::move(view));
-                known.push_back(planesSaySomething(plans[i]));
+                known.push_back(planesOfPoints(plans[i]));
             }
         }
         if (bundle.views.size() > static_cast<std::size_t>(job_.limits.maxViews))
@@ -107,7 +107,8 @@ class BundleReader {
         object.about.bounds = object.notes.bounds;
         object.about.origin = object.notes.origin;
         object.about.time = object.notes.start;
-        object.about.duration = object.notes.duration;
+        // Frames of a film last as its Timeline says.
+        if (still && !mayMove(scene)) object.about.duration = object.notes.duration;
         // A moment at 0, which needs no note.
         if (object.about.duration && !object.about.time) object.about.time = 0;
         return object;
@@ -134,7 +135,7 @@ class BundleReader {
             place(view, plan, object.notes, 0);
             headers.bundle.views.push_back(std::move(view));
             headers.kinds.push_back(*kinds);
-            known.push_back(planesSaySomething(plan));
+            known.push_back(planesOfPoints(plan));
         }
         makeNamesUnique(headers.bundle);
         leaveOutStaleBounds(headers.bundle, known);
@@ -225,14 +226,14 @@ class BundleReader {
             applyNotes(view, plan, said->second, layer);
         applySimilarity(view, plan.worldFromLocal);
     }
-    /// Whether the planes of a view are around its points. Those of an OctreeImage are not, and a
-    /// view without a point is written with the values that the fields have by themselves.
-    static bool planesSaySomething(const ViewPlan& plan) {
-        return !plan.octree && !(plan.depthImage->get<float>("nearPlane") == 10.0f &&
-                                 plan.depthImage->get<float>("farPlane") == 100.0f);
+    /// Whether the planes of a view are around its points: those of an OctreeImage are not.
+    static bool planesOfPoints(const ViewPlan& plan) {
+        return !plan.octree &&
+               planesSaySomething(static_cast<double>(plan.depthImage->get<float>("nearPlane")),
+                                  static_cast<double>(plan.depthImage->get<float>("farPlane")));
     }
     /// Text may be edited: bounds of which some view sees nothing between its planes are not those
-    /// of the views. `known`: planesSaySomething() of each.
+    /// of the views. `known`: planesOfPoints() of each.
     void leaveOutStaleBounds(Bundle& bundle, const std::vector<bool>& known) {
         if (!bundle.bounds || bundle.bounds->empty()) return;
         // Cameras and planes are floats: their last bit, of three values that add up.
@@ -297,6 +298,15 @@ class BundleReader {
                                   fmt::join(unmoved, ", ")));
     }
 
+    /// Whether something may change after the start: what a WorldInfo says of the duration is then
+    /// of all the film.
+    [[nodiscard]] bool mayMove(const Scene& scene) const {
+        return document_.frames.size() > 1 || document_.odFrames.size() > 1 ||
+               !scene.routes.empty() ||
+               std::ranges::any_of(document_.objectDescriptors(), [](const ObjectDescriptor* od) {
+                   return !od->streams.empty() && od->streams[0].samples.size() > 1;
+               });
+    }
     /// Says what would change the views in time, besides commands.
     void noteMotion(const Scene& scene, const ShownScene& shown) {
         std::unordered_map<int, std::size_t> pictures;

@@ -414,6 +414,14 @@ Result<Document> sceneFromBundle(const Bundle& bundle, const SceneWriteOptions& 
     return sceneFromViews(*viewsOf(bundle), options, nullptr, job);
 }
 
+void noteOrigin(const glm::dvec3& origin, const Bundle& before, Job& job) {
+    if (origin == before.origin) return;
+    job.note(
+        fmt::format("the coordinates are too large for 32-bit floats: the origin {} {} {} is "
+                    "subtracted before they are rounded, and kept beside them",
+                    origin.x, origin.y, origin.z));
+}
+
 Result<Document> sceneFromViews(const ViewTable& table, const SceneWriteOptions& options,
                                 PictureSpool* spool, Job& job) {
     if ((options.pointTexture || options.octreeLevels > 0) && !table.whole()) {

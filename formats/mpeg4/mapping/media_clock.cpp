@@ -73,7 +73,11 @@ Presentation presentationOf(const ElementaryStream& stream) {
     std::ranges::stable_sort(all.shown, {}, &Presentation::Shown::time);
     if (stream.edits.edits.empty()) return all;
 
+    // A text may delay the track of a file: its edits, too.
+    const double delay =
+        stream.samples.empty() ? 0 : static_cast<double>(stream.samples[0].time) * tick;
     Presentation edited;
+    edited.duration = delay;
     const double editTick = 1.0 / std::max<std::uint32_t>(stream.edits.timescale, 1);
     edited.tick = std::max(tick, editTick);
     for (const Edit& edit : stream.edits.edits) {
@@ -81,7 +85,7 @@ Presentation presentationOf(const ElementaryStream& stream) {
         const double length = static_cast<double>(edit.duration) * editTick;
         edited.duration += length;
         if (edit.mediaTime < 0) continue;
-        const double media = static_cast<double>(edit.mediaTime) * tick;
+        const double media = static_cast<double>(edit.mediaTime) * tick + delay;
         const double slack = halfTick(edited.tick, media);
         // The picture under way when the edit begins, and those that begin in it.
         const auto begun =

@@ -42,6 +42,7 @@ struct Presentation {
     /// the first one before that. There must be one.
     [[nodiscard]] std::size_t sampleAt(double time, double slack) const;
 };
+/// The edit list counts from the first sample, and begins when that is decoded.
 /// Samples that the edit list leaves out are never shown; an edit list that leaves out all, or that
 /// shows more than kMostMoments pictures, is passed over.
 [[nodiscard]] Presentation presentationOf(const ElementaryStream& stream);

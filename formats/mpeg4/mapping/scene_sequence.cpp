@@ -25,7 +25,7 @@ class SceneSequence : public Sequence {
         // Of what stands still no picture is asked for twice.
         if (timeline_.moves()) images_.keepPictures(keptPictureBytes(job.limits));
         STX_TRY(const auto scene, composeScene(document_.frames, document_.frames.front().time));
-        start_ = ownStart(scene, job.limits);
+        start_ = ownClock(scene, job.limits).start;
         noteBrokenKeys(document_, job);
         // Once for all frames: it is what stands still.
         if (options_.pixels && options_.environment) {

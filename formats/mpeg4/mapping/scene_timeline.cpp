@@ -226,12 +226,18 @@ class Moments {
 
 }  // namespace
 
-double ownStart(const Scene& scene, const Limits& limits) {
+OwnClock ownClock(const Scene& scene, const Limits& limits) {
+    OwnClock own;
     const auto shown = shownScene(scene.root, limits);
-    if (!shown) return 0;  // reading a frame gives the error
-    for (const ShownInfo& info : shown->infos)
-        if (const auto start = ViewNotes::parse(info.text).start) return *start;
-    return 0;
+    if (!shown) return own;  // reading a frame gives the error
+    std::optional<double> start;
+    for (const ShownInfo& info : shown->infos) {
+        const ViewNotes notes = ViewNotes::parse(info.text);
+        if (!start) start = notes.start;
+        if (!own.duration) own.duration = notes.duration;
+    }
+    own.start = start.value_or(0);
+    return own;
 }
 
 bool isActive(const Node& node, StreamImages& images, double now) {
@@ -271,12 +277,14 @@ Result<Timeline> timelineOf(const Document& document, const StreamImages& images
         const double step = times[times.size() - 1] - times[times.size() - 2];
         line.end = end > times.back() ? end : times.back() + step;
     }
+    STX_TRY(const auto scene, composeScene(document.frames, document.frames.front().time));
+    const OwnClock own = ownClock(scene, images.limits());
+    if (own.duration) line.end = std::max(times.back(), times.front() + *own.duration);
     line.findTick();
     line.tick = std::max(line.tick, coarsest);
-    STX_TRY(const auto scene, composeScene(document.frames, document.frames.front().time));
-    if (const double own = ownStart(scene, images.limits()); own != 0) {
-        for (double& time : times) time += own;
-        line.end += own;
+    if (own.start != 0) {
+        for (double& time : times) time += own.start;
+        line.end += own.start;
         // Where doubles are that coarse, neighbours may round to one.
         times.erase(std::unique(times.begin(), times.end()), times.end());
     }

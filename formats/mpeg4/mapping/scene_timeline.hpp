@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "formats/mpeg4/mapping/stream_images.hpp"
 #include "lib/model/sequence.hpp"
 
@@ -13,14 +15,20 @@ namespace stx::mpeg4 {
 /// cycle then under way, too; at least once. Moments of two streams within half a tick of the
 /// coarser clock are one. Of a scene whose commands do not fit it, only commands are moments from
 /// there on.
+/// It ends where a note says how long it is, else with what runs longest.
 /// Errors: (unsupported) more than four million moments, or too many nodes to look at.
 /// `timesFromStart`: as SceneReadOptions has it. A note of `job` names the events of commands that
 /// are lost.
 [[nodiscard]] Result<Timeline> timelineOf(const Document& document, const StreamImages& images,
                                           bool timesFromStart = false, Job* job = nullptr);
 
-/// What a film's own clock shows when the presentation begins, in seconds.
-[[nodiscard]] double ownStart(const Scene& scene, const Limits& limits);
+/// What a WorldInfo says of a film's own clock: when the presentation begins, and how long the film
+/// or the moment is, in seconds.
+struct OwnClock {
+    double start = 0;
+    std::optional<double> duration;
+};
+[[nodiscard]] OwnClock ownClock(const Scene& scene, const Limits& limits);
 
 /// Whether a TimeSensor or a MovieTexture is active at a time of the scene, in seconds. `images`
 /// are put to that time.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <map>
@@ -9,27 +10,18 @@
 #include <utility>
 
 #include "formats/mpeg4/mapping/coded_view.hpp"
+#include "formats/mpeg4/mapping/film_ranges.hpp"
 #include "formats/mpeg4/mapping/media_clock.hpp"
+#include "formats/mpeg4/mapping/scene_timeline.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mapping/video_write.hpp"
 #include "formats/mpeg4/mapping/view_notes.hpp"
 #include "formats/video/video_process.hpp"
+#include "lib/model/from_origin.hpp"
 #include "lib/model/view_table.hpp"
 
 namespace stx::mpeg4 {
 namespace {
-
-/// What must not change from frame to frame.
-struct ViewRange {
-    double nearPlane = std::numeric_limits<double>::infinity(), farPlane = 0;
-    int depthBits = 8;
-    float longestSplat = 0;
-    bool normals = false, splats = false;
-    bool everUnknown = false;  ///< NoDepth::unknown, of its frames
-    bool everEmpty = false;
-    UnknownPixels unknown;  ///< of films whose pictures have no alpha
-    Refined refined;        ///< steps of the first frame, and the largest doubt
-};
 
 /// A view on its way into the document.
 struct ViewTrack {
@@ -45,16 +37,10 @@ struct ViewTrack {
     bool coverageLost = false;         ///< by colour that is H.264
 };
 
-/// Errors: those of checkSameViews(), (invalidInput) another origin: a scene has one, and
-/// (unsupported) a view whose size changes: a stream has one.
+/// Errors: those of checkSameViews(), and (unsupported) a view whose size changes: a stream has
+/// one.
 Result<void> checkFrame(const Bundle& first, const Bundle& frame) {
     STX_CHECK(checkSameViews(first, frame));
-    const auto &from = frame.origin, &start = first.origin;
-    if (from != start)
-        return fail(ErrorCode::invalidInput,
-                    "its coordinates count from ({} {} {}), but those at the start from ({} {} "
-                    "{}); fromOrigin() counts all frames from one origin",
-                    from.x, from.y, from.z, start.x, start.y, start.z);
     for (std::size_t i = 0; i < first.views.size(); ++i) {
         const Camera &was = first.views[i].camera, &is = frame.views[i].camera;
         if (is.width != was.width || is.height != was.height)
@@ -105,10 +91,15 @@ class SequenceWriter {
         return ticksAt(seconds - frames_.timeline().start(), scale_);
     }
 
-    /// A frame, with the ranges of the sequence when these are known.
+    /// A frame from the film's origin, with the ranges of the sequence when these are known.
     Result<std::unique_ptr<ViewTable>> frame(std::size_t i, Job& job) {
         auto table = frames_.views(i, job);
         if (!table) return tl::unexpected(table.error().at(frames_.timeline().nameOf(i)));
+        if (!origin_) {
+            origin_ = originOf(**table);
+            noteOrigin(*origin_, std::as_const(**table).about(), job);
+        }
+        *table = countedFrom(*origin_, std::move(*table));
         if (ranges_.empty()) return table;
         std::vector<ViewHeader> headers;
         loss_.ownSteps.clear();
@@ -123,6 +114,7 @@ class SequenceWriter {
             // A note says it of the whole film; alpha, where it is written, of each frame.
             const bool unknown = hasAlpha() ? ranges_[k].everUnknown : ranges_[k].unknown.any();
             view.noDepth = unknown ? NoDepth::unknown : NoDepth::empty;
+            view.pruned = ranges_[k].everPruned;
             view.refined = ranges_[k].refined;
         }
         return withHeaders(std::move(*table), headers);
@@ -130,7 +122,7 @@ class SequenceWriter {
 
     Result<void> findRanges() {
         const std::size_t count = frames_.timeline().count();
-        std::vector<ViewRange> ranges;
+        FilmRanges ranges(options_);
         for (std::size_t i = 0; i < count; ++i) {
             job_.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(2 * count),
                           "writing frames");
@@ -141,92 +133,25 @@ class SequenceWriter {
             STX_TRY(const auto table, frame(i, i == 0 ? job_ : quiet));
             if (i == 0) {
                 if (table->count() == 0) return Bundle().checkHeaders();
-                ranges.resize(table->count());
                 first_ = headersOf(std::as_const(*table).about());
             }
+            noteOtherEnvironment(std::as_const(*table).about(), i);
             auto looked = checkFrame(first_, std::as_const(*table).about());
-            if (looked) looked = lookAt(*table, ranges, i == 0, quiet);
+            if (looked) looked = ranges.add(*table, quiet);
             if (!looked) return tl::unexpected(looked.error().at(frames_.timeline().nameOf(i)));
         }
-        for (std::size_t k = 0; k < ranges.size(); ++k)
-            if (ranges[k].everUnknown && ranges[k].everEmpty)
-                job_.note(
-                    fmt::format("view '{}': missing depth is empty in some frames and unknown in "
-                                "others; in MPEG-4 it is unknown in all",
-                                first_.views[k].name));
-        ranges_ = std::move(ranges);
+        ranges_ = ranges.finish(first_, job_);
+        bounds_ = ranges.bounds();
         return {};
     }
-    /// Widens ranges and bounds by a frame, whose pixels are read where its headers do not tell
-    /// all.
-    Result<void> lookAt(const ViewTable& table, std::vector<ViewRange>& ranges, bool first,
-                        Job& job) {
-        const Bundle& about = table.about();
-        std::vector<Bounds> bounds(table.count());
-        const auto look = [&](std::size_t k, const ViewHeader& view,
-                              float longestSplat) -> Result<void> {
-            if (auto done = widen(ranges[k], view, table.kindsOf(k), longestSplat, first); !done)
-                return tl::unexpected(done.error().at(fmt::format("view '{}'", view.name)));
-            return {};
-        };
-        const bool unknown =
-            !hasAlpha() && std::ranges::any_of(about.views, [](const ViewHeader& view) {
-                return view.noDepth == NoDepth::unknown;
-            });
-        if (about.bounds && table.planesKnown() && !unknown &&
-            std::ranges::none_of(table.kinds(), &ViewImageKinds::hasSplats)) {
-            for (std::size_t k = 0; k < table.count(); ++k) STX_CHECK(look(k, about.views[k], 0));
-        } else {
-            STX_CHECK(forEachView(
-                table, {"reading", 0}, job,
-                [&](std::size_t k,
-                    const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
-                    if (!about.bounds) bounds[k] = view->computeBounds();
-                    if (!hasAlpha()) lookAtUnknown(*view, ranges[k].unknown);
-                    return look(k, *view, view->hasSplats() ? longestSplatOf(*view) : 0);
-                }));
-        }
-        if (about.bounds) bounds = {*about.bounds};
-        for (const Bounds& here : bounds) {
-            if (here.empty()) continue;
-            bounds_.add(here.min);
-            bounds_.add(here.max);
-        }
-        return {};
-    }
-    static void lookAtUnknown(const ReferenceView& view, UnknownPixels& unknown) {
-        if (view.noDepth == NoDepth::empty) return;
-        bool clamped = false;
-        const Rgba8Image* own = view.texture.rgba8();
-        unknown.add(own ? *own : rgba8FromTexture(view.texture, clamped), view.depth);
-    }
-    Result<void> widen(ViewRange& range, const ViewHeader& view, const ViewImageKinds& kinds,
-                       float longestSplat, bool first) const {
-        if (first) {
-            range.normals = kinds.normal;
-            range.splats = kinds.hasSplats();
-            range.refined.steps = view.refined.steps;
-        }
-        range.refined.doubt = std::max(range.refined.doubt, view.refined.doubt);
-        if (range.normals != kinds.normal || range.splats != kinds.hasSplats())
-            return fail(ErrorCode::unsupported,
-                        "normals or splats are there in some frames only; bake all or none");
-        if (view.pruned && !hasAlpha())
-            return fail(ErrorCode::unsupported,
-                        "a pruned view that moves keeps its mark in the alpha of its colour, "
-                        "which {} does not have; use PNG",
-                        asVideo() ? "H.264" : "JPEG");
-        if (view.noDepth == NoDepth::unknown)
-            range.everUnknown = true;
-        else {
-            range.everEmpty = true;
-            range.unknown.addEmpty();
-        }
-        range.nearPlane = std::min(range.nearPlane, view.nearPlane);
-        range.farPlane = std::max(range.farPlane, view.farPlane);
-        range.depthBits = std::max(range.depthBits, view.depthBits);
-        range.longestSplat = std::max(range.longestSplat, longestSplat);
-        return {};
+    void noteOtherEnvironment(const Bundle& about, std::size_t frame) {
+        const auto &is = about.environment, &was = first_.environment;
+        if (environmentDiffers_ || is == was || (is && was && *is == *was)) return;
+        environmentDiffers_ = true;
+        job_.note(
+            fmt::format("the environment of {} is not that of the first frame, which the film "
+                        "keeps; write .exr for one in each frame",
+                        frames_.timeline().nameOf(frame)));
     }
 
     /// The document of the first frame, whose streams the others go into.
@@ -235,7 +160,7 @@ class SequenceWriter {
         quiet.workFor(job_);
         STX_TRY(auto table, frame(0, quiet));
         table->about().bounds = bounds_;
-        table->about().duration.reset();  // the streams tell it
+        table->about().duration.reset();  // of the first frame; see noteDuration()
         SceneWriteOptions options = options_;
         for (const ViewRange& range : ranges_)
             options.splatRanges.push_back(range.splats ? range.longestSplat : 0);
@@ -390,9 +315,7 @@ class SequenceWriter {
         return images;
     }
     [[nodiscard]] bool asVideo() const { return options_.h264 >= 0; }
-    [[nodiscard]] bool hasAlpha() const {
-        return !asVideo() && options_.texture == SceneWriteOptions::Texture::png;
-    }
+    [[nodiscard]] bool hasAlpha() const { return keepsAlpha(options_); }
 
     [[nodiscard]] Result<Padding> paddingOf(const Camera& camera) const {
         return centringPadding(camera, std::min(job_.limits.maxImageSide, 65535));
@@ -563,6 +486,20 @@ class SequenceWriter {
                 texture->set(std::string_view(kRoles[r]), movie);
             }
         }
+        return noteDuration();
+    }
+    /// How long the film is, where what is left of it does not tell to a tick: frames at the end
+    /// that change nothing are not there, and a sample lasts 2^32 ticks at most.
+    Result<void> noteDuration() {
+        const double duration = frames_.timeline().duration();
+        STX_TRY(const auto images, StreamImages::make(document_, {}, job_.limits));
+        STX_TRY(const auto line, timelineOf(document_, images));
+        if (std::abs(line.duration() - duration) * scale_ <= 1) return {};
+        ViewNotes notes;
+        notes.duration = duration;
+        const auto& root = std::get<ReplaceScene>(document_.frames[0].commands[0]).root;
+        auto& info = root->get<NodeList>("children")[0]->edit<std::vector<std::string>>("info");
+        for (std::string& text : notes.text()) info.push_back(std::move(text));
         return {};
     }
 
@@ -573,7 +510,9 @@ class SequenceWriter {
     std::vector<ViewRange> ranges_;
     Bounds bounds_;
     Document document_;
-    Bundle first_;  ///< names and cameras
+    Bundle first_;                      ///< names and cameras
+    std::optional<glm::dvec3> origin_;  ///< of all frames
+    bool environmentDiffers_ = false;
     std::vector<ViewTrack> tracks_;
     std::uint32_t scale_ = 1000;
     std::optional<VideoStreams> video_;

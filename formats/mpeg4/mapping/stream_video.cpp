@@ -32,6 +32,7 @@ Result<std::shared_ptr<StreamVideo::Decoder>> StreamVideo::decoderOf(const Eleme
         found->lastUse = ++uses_;
         return found;
     }
+    endOne();
     auto decoder = std::make_shared<Decoder>();
     decoder->lastUse = ++uses_;
     const auto open = [&]() -> Result<void> {
@@ -43,10 +44,7 @@ Result<std::shared_ptr<StreamVideo::Decoder>> StreamVideo::decoderOf(const Eleme
                 decoder->process->ask(video::Tag::openStream, request.bytes, video::Tag::done));
         return {};
     };
-    if (auto opened = open(); !opened) {
-        decoders_.erase(&stream);
-        return propagate(opened);
-    }
+    STX_CHECK(open());
     for (const Sample& sample : stream.samples)
         decoder->coded.push_back(
             {static_cast<std::int64_t>(sample.time) + sample.compositionOffset, sample.sync});
@@ -70,17 +68,22 @@ Result<std::shared_ptr<StreamVideo::Decoder>> StreamVideo::decoderOf(const Eleme
         return process->ask(video::Tag::push, request.bytes, video::Tag::ready);
     };
     decoder->finder.emplace(*decoder->process, decoder->coded, std::move(source));
-    if (decoders_.size() > kMostDecoders) {
-        // One that another thread works with ends when that has its picture.
-        auto oldest = decoders_.end();
-        for (auto it = decoders_.begin(); it != decoders_.end(); ++it)
-            if (it->second &&
-                (oldest == decoders_.end() || it->second->lastUse < oldest->second->lastUse))
-                oldest = it;
-        if (oldest != decoders_.end()) decoders_.erase(oldest);
-    }
-    decoders_[&stream] = decoder;
+    found = decoder;
     return decoder;
+}
+
+void StreamVideo::endOne() {
+    std::vector<std::shared_ptr<Decoder>*> running;
+    for (auto& [stream, decoder] : decoders_)
+        if (decoder) running.push_back(&decoder);
+    if (running.size() < kMostDecoders) return;
+    const auto [oldest, newest] =
+        std::ranges::minmax_element(running, {}, [](const auto* one) { return (*one)->lastUse; });
+    // Frames ask for all streams in turn: the one used longest ago is the next to be asked for. It
+    // goes where it was left out of two turns.
+    const bool leftOut = uses_ - (**oldest)->lastUse > 2 * decoders_.size();
+    // One that another thread works with ends when that has its picture.
+    (leftOut ? **oldest : **newest).reset();
 }
 
 Result<VideoPicture> StreamVideo::picture(const ElementaryStream& stream, std::size_t sample,

@@ -10,8 +10,8 @@
 namespace stx::mpeg4 {
 
 /// Pictures of streams that only a video decoder reads (H.264, HEVC, MPEG-4 Visual, MPEG-2). Each
-/// stream has a decoder of its own while it is used; those that were not used for long end. Safe
-/// from several threads.
+/// stream has a decoder of its own while it is used, up to a number of them. Safe from several
+/// threads.
 class StreamVideo {
   public:
     StreamVideo();
@@ -26,8 +26,11 @@ class StreamVideo {
     struct Decoder;
     [[nodiscard]] Result<std::shared_ptr<Decoder>> decoderOf(const ElementaryStream& stream,
                                                              const Limits& limits);
+    /// Ends a decoder where there are as many as may be.
+    void endOne();
 
     std::mutex mutex_;
+    /// Of each stream that was asked for; null: it has ended.
     std::map<const ElementaryStream*, std::shared_ptr<Decoder>> decoders_;
     std::uint64_t uses_ = 0;
 };

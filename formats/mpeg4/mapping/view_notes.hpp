@@ -18,7 +18,8 @@
 ///
 ///     "bounds minX minY minZ maxX maxY maxZ"
 ///     "start seconds" (of the film's own clock, at the presentation's 0; see Timeline)
-///     "duration seconds" (of a moment of a film that stands alone; see Bundle::duration)
+///     "duration seconds" (of a moment of a film that stands alone, see Bundle::duration; of a film
+///     whose pictures and commands do not tell its end)
 ///     "origin x y z" (added to all coordinates here, gives the world's; see Bundle::origin)
 ///     "views count" (DepthImages, or pictures of an OctreeImage, beside the WorldInfo)
 ///     "name #N the view's own name"

@@ -33,6 +33,12 @@ struct Similarity {
 /// Moves a view, with planes, normals, splats and depth, from a local frame into the world.
 void applySimilarity(ReferenceView& view, const Similarity& worldFromLocal);
 
+/// Whether the planes of a DepthImage are around its points. A view without a point is written with
+/// the values that the fields have by themselves.
+[[nodiscard]] inline bool planesSaySomething(double nearPlane, double farPlane) {
+    return nearPlane != 10.0 || farPlane != 100.0;
+}
+
 /// How a view's image is widened so that its principal point is the centre, which a DepthImage
 /// needs.
 struct Padding {

@@ -163,15 +163,18 @@ Result<void> readMux(const TextDescriptor& d, ElementaryStream& stream) {
         seconds = 1.0 / frameRate;
     }
     const double start = std::nearbyint(startMs / 1000 * stream.timescale);
-    const double ticks = std::nearbyint(seconds * stream.timescale);
+    const auto ticksOf = [&](std::int64_t images) {
+        return std::nearbyint(static_cast<double>(images) * seconds * stream.timescale);
+    };
+    const double ticks = seconds * stream.timescale;
     if (start > 1e15 || ticks > 4294967295.0)
         return failAt(d.where, ErrorCode::invalidInput,
                       "the times of '{}' do not fit: {:g} + {:g} ticks", excerpt(stream.fileName),
                       start, ticks);
     for (std::int64_t i = 0; i < count; ++i) {
         Sample sample;
-        sample.duration = static_cast<std::uint32_t>(ticks);
-        sample.time = static_cast<std::uint64_t>(start) + sample.duration * std::uint64_t(i);
+        sample.duration = static_cast<std::uint32_t>(ticksOf(i + 1) - ticksOf(i));
+        sample.time = static_cast<std::uint64_t>(start + ticksOf(i));
         stream.samples.push_back(sample);
     }
     return {};

@@ -352,6 +352,69 @@ TEST(IsobmffFile, DamageIsToldWithItsPlace) {
     EXPECT_NE(errorOfFile(cut).find("'mdat' claims"), std::string::npos) << errorOfFile(cut);
 }
 
+/// The file with a second sample entry in its last track, `differs` from the first or the same, of
+/// which the one chunk is, by number.
+Bytes withTwoEntries(const Bytes& good, bool differs, std::uint32_t number) {
+    const auto get32 = [&](const Bytes& bytes, std::size_t at) {
+        return ByteReader(ByteSpan(bytes).subspan(at)).u32();
+    };
+    Bytes out = good;
+    std::size_t stsd = find(out, "stsd");
+    for (auto next = stsd; next < out.size();) {
+        stsd = next;
+        const Bytes rest(out.begin() + static_cast<std::ptrdiff_t>(stsd) + 4, out.end());
+        next = stsd + 4 + find(rest, "stsd");
+    }
+    const std::size_t entry = stsd + 12, size = get32(out, entry);
+    Bytes second(out.begin() + static_cast<std::ptrdiff_t>(entry),
+                 out.begin() + static_cast<std::ptrdiff_t>(entry + size));
+    if (differs) second.back() ^= std::byte{1};
+    put32(out, stsd + 8, 2);
+    const Bytes behind(out.begin() + static_cast<std::ptrdiff_t>(stsd), out.end());
+    put32(out, stsd + find(behind, "stsc") + 20, number);
+    // Sizes of all boxes around it, and where the chunks are.
+    const std::string_view around[] = {"moov", "trak", "mdia", "minf", "stbl", "stsd"};
+    for (std::size_t at = 0, box = 0; box < 6;) {
+        const std::size_t length = get32(out, at);
+        const bool here = std::memcmp(out.data() + at + 4, around[box].data(), 4) == 0;
+        if (!here || at + length < entry) {
+            at += length;
+            continue;
+        }
+        put32(out, at, static_cast<std::uint32_t>(length + size));
+        at += 8;
+        ++box;
+    }
+    for (std::size_t at = 0; at + 12 < out.size(); ++at)
+        if (std::memcmp(out.data() + at, "stco", 4) == 0)
+            put32(out, at + 12, get32(out, at + 12) + static_cast<std::uint32_t>(size));
+    out.insert(out.begin() + static_cast<std::ptrdiff_t>(entry + size), second.begin(),
+               second.end());
+    return out;
+}
+
+TEST(IsobmffFile, SamplesOfAnotherEntryThanTheFirstAreRefused) {
+    const Bytes good = written(sample());
+    EXPECT_EQ(errorOfFile(withTwoEntries(good, false, 1)), "read");
+    EXPECT_EQ(errorOfFile(withTwoEntries(good, false, 2)), "read");
+    EXPECT_EQ(errorOfFile(withTwoEntries(good, true, 1)), "read");
+    const Bytes other = withTwoEntries(good, true, 2);
+    Job job;
+    const auto document = readMp4(ByteSource::fromBytes(other), job);
+    ASSERT_FALSE(document);
+    EXPECT_EQ(document.error().code, ErrorCode::unsupported);
+    EXPECT_NE(document.error().text().find("moov/trak[4]/mdia/minf/stbl/stsc at byte"),
+              std::string::npos)
+        << document.error().text();
+    EXPECT_NE(document.error().text().find(
+                  "chunk 1 is of sample entry 2 ('mp4v'), which is not the first ('mp4v') again"),
+              std::string::npos)
+        << document.error().text();
+    EXPECT_NE(errorOfFile(withTwoEntries(good, true, 3))
+                  .find("chunk 1 is of sample entry 3, but there are 2"),
+              std::string::npos);
+}
+
 TEST(IsobmffFile, FragmentedAndEncryptedFilesAreRefusedByName) {
     const Bytes good = written(sample());
     const auto renamed = [&](std::string_view from, std::string_view to) {

@@ -437,6 +437,36 @@ TEST(Text, ImagesSurviveBothForms) {
     EXPECT_TRUE(sameFrames(d.frames, mustReadXmt(xmtOf(d)).frames)) << xmtOf(d);
 }
 
+TEST(Text, NumberedPicturesDoNotDrift) {
+    struct Rate {
+        int frames, milliseconds;
+        double rate;
+    };
+    for (const auto& [frames, milliseconds, rate] :
+         {Rate{120, 2000, 60}, Rate{120, 4000, 30}, Rate{120, 5000, 24}, Rate{50, 2000, 25}}) {
+        SCOPED_TRACE(rate);
+        const Document d = mustReadBt(fmt::format(
+            "Group {{ }} AT 0 {{ UPDATE OD [ ObjectDescriptor {{ objectDescriptorID 9 esDescr [ "
+            "ES_Descriptor {{ ES_ID 9 decConfigDescr DecoderConfigDescriptor {{ streamType 4 }} "
+            "muxInfo MuxInfo {{ fileName \"c_%04d.png\" frameRate {} duration {} startTime 7 }} "
+            "}} ] }} ] }}",
+            rate, milliseconds));
+        const auto* od = d.findObjectDescriptor(9);
+        ASSERT_NE(od, nullptr);
+        const auto& samples = od->streams.at(0).samples;
+        ASSERT_EQ(samples.size(), static_cast<std::size_t>(frames));
+        EXPECT_EQ(samples[0].time, 7u);
+        for (std::size_t i = 0; i < samples.size(); ++i) {
+            const std::uint64_t next = i + 1 < samples.size()
+                                           ? samples[i + 1].time
+                                           : 7u + static_cast<unsigned>(milliseconds);
+            EXPECT_EQ(samples[i].time + samples[i].duration, next) << i;
+            EXPECT_NEAR(static_cast<double>(samples[i].time),
+                        7 + 1000 * static_cast<double>(i) / rate, 0.5 + 1e-9);
+        }
+    }
+}
+
 TEST(Text, CharactersThatXmlCannotHoldAreReplacedAndSaid) {
     Document d = mustReadBt(kMinimal);
     NodePtr info = makeNode("WorldInfo");

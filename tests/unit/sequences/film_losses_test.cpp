@@ -3,6 +3,7 @@
 #include <array>
 
 #include "formats/any/sequences.hpp"
+#include "tests/painted_environment.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/sequences/moving_views.hpp"
 
@@ -140,4 +141,87 @@ TEST(FilmLosses, DepthThatTheFilmsRangeRoundsIsNoted) {
     // Half of a step of the film.
     EXPECT_LE(off, 0.5 * 9999 / 65534 * 1.001);
     EXPECT_GE(off, 0.9 * 0.5 * 9999 / 65534);
+}
+
+TEST(FilmLosses, AFrameWithoutAPointHasNoPartInTheDepthRange) {
+    for (const std::size_t empty : {0u, 1u, 3u}) {
+        TemporaryFolder folder("empty_frames");
+        Job job;
+        const auto change = [&](ReferenceView& view, std::size_t i) {
+            if (i != empty && empty != 3) return;
+            view.depth = Image<float>(24, 16, kNoDepth);
+            view.texture = Texture(Rgba8Image(24, 16, {0, 0, 0, 0}));
+            view.nearPlane = ViewHeader().nearPlane;
+            view.farPlane = ViewHeader().farPlane;
+        };
+        ChangedViews frames(change);
+        ASSERT_TRUE(saveSequence(frames, folder / "a.mp4", {}, job));
+        EXPECT_EQ(job.takeNotes(), std::vector<std::string>{});
+        const auto read = openSequence(folder / "a.mp4", {}, job);
+        ASSERT_TRUE(read) << read.error().text();
+        const auto last = (*read)->frame((*read)->timeline().count() - 1, job);
+        ASSERT_TRUE(last) << last.error().text();
+        const auto was = frames.frame(2, job);
+        EXPECT_EQ(last->views[0].nearPlane, was->views[0].nearPlane) << empty;
+        EXPECT_EQ(last->views[0].farPlane, was->views[0].farPlane) << empty;
+        EXPECT_EQ(last->views[0].depth, was->views[0].depth) << empty;
+    }
+}
+
+TEST(FilmLosses, PlanesThatAnEmptyViewHasMayBeThoseOfPoints) {
+    TemporaryFolder folder("default_planes");
+    Job job;
+    ChangedViews frames([](ReferenceView& view, std::size_t i) {
+        if (i != 1) return;
+        view.nearPlane = ViewHeader().nearPlane;
+        view.farPlane = ViewHeader().farPlane;
+        view.depth = Image<float>(24, 16, 90.0f);
+    });
+    ASSERT_TRUE(saveSequence(frames, folder / "a.mp4", {}, job));
+    const auto read = openSequence(folder / "a.mp4", {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    const auto frame = (*read)->frame(1, job);
+    ASSERT_TRUE(frame) << frame.error().text();
+    EXPECT_NEAR(frame->views[0].depth.at(0, 0), 90, 0.002);
+}
+
+TEST(FilmLosses, WhatIsPrunedInALaterFrameStaysSo) {
+    TemporaryFolder folder("pruned");
+    Job job;
+    const auto change = [](ReferenceView& view, std::size_t i) {
+        if (i == 1) view.depth.at(3, 3) = kNoDepth;  // with full alpha
+        view.pruned = i == 1;
+    };
+    ChangedViews frames(change);
+    ASSERT_TRUE(saveSequence(frames, folder / "a.mp4", {}, job));
+    EXPECT_EQ(job.takeNotes(),
+              std::vector<std::string>{"view 'view1': it is pruned in some frames and not in "
+                                       "others; in MPEG-4 it is in all"});
+    const auto read = openSequence(folder / "a.mp4", {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    const auto frame = (*read)->frame(1, job);
+    ASSERT_TRUE(frame) << frame.error().text();
+    EXPECT_TRUE(frame->views[0].pruned);
+    EXPECT_EQ(frame->views[0].texture.rgba8()->at(3, 3).a, 255);
+}
+
+TEST(FilmLosses, AnEnvironmentThatChangesIsNoted) {
+    TemporaryFolder folder("environments");
+    for (const bool differs : {false, true}) {
+        auto frames =
+            changed(std::make_unique<MovingViews>(4), [&](Bundle& frame, Job&) -> Result<void> {
+                // Each frame of files has one of its own.
+                const bool other = differs && *frame.time > 0.05;
+                frame.environment = std::make_shared<Environment>(paintedCube(other ? 4 : 2));
+                return {};
+            });
+        Job job;
+        ASSERT_TRUE(saveSequence(*frames, folder / "a.mp4", {}, job));
+        const auto notes = job.takeNotes();
+        EXPECT_EQ(std::ranges::count(notes,
+                                     "the environment of frame 2 (0.08 s) is not that of the first "
+                                     "frame, which the film keeps; write .exr for one in each "
+                                     "frame"),
+                  differs ? 1 : 0);
+    }
 }

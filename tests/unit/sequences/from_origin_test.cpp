@@ -115,15 +115,63 @@ TEST(FromOrigin, FramesWithOriginsOfTheirOwnCountFromOne) {
     }
 }
 
-TEST(FromOrigin, MpegFourTakesOneOrigin) {
-    TemporaryFolder folder("origins_refused");
+TEST(FromOrigin, MpegFourCountsAllFramesFromOne) {
+    TemporaryFolder folder("origins_of_frames");
     Job job;
-    const auto saved = saveSequence(*ownOrigins(), folder / "film.mp4", {}, job);
-    ASSERT_FALSE(saved);
-    EXPECT_EQ(saved.error().text(),
-              "frame 1 (0.04 s): its coordinates count from (40 5 0), but those at the start from "
-              "(0 5 0); fromOrigin() counts all frames from one origin");
-    EXPECT_FALSE(std::filesystem::exists(folder / "film.mp4"));
+    const auto film = folder / "film.mp4";
+    const auto saved = saveSequence(*ownOrigins(), film, {}, job);
+    ASSERT_TRUE(saved) << saved.error().text();
+    EXPECT_EQ(job.takeNotes(), std::vector<std::string>{});
+    const auto read = openSequence(film, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    MovingViews truth(3);
+    for (std::size_t i = 0; i < 3; ++i) {
+        const Bundle was = *truth.frame(i, job), is = *(*read)->frame(i, job);
+        EXPECT_EQ(is.origin, glm::dvec3(0, 5, 0));
+        for (std::size_t k = 0; k < was.views.size(); ++k)
+            EXPECT_LT(glm::distance(is.views[k].camera.position + is.origin,
+                                    was.views[k].camera.position),
+                      1e-5);
+    }
+}
+
+/// Frames `from` on of views at a distance that floats do not hold.
+std::unique_ptr<Sequence> farFrames(bool bounds, std::vector<std::size_t> numbers) {
+    auto frames = farViews(kFar + glm::dvec3(0.123, 0, 0.456), bounds);
+    return std::move(*someFrames(std::move(frames), std::move(numbers)));
+}
+
+TEST(FromOrigin, MpegFourCountsWhatIsFarFromAnOrigin) {
+    TemporaryFolder folder("far_in_mpeg4");
+    for (const bool bounds : {false, true})
+        for (const char* name : {"a.mp4", "a.bt", "a.xmt"})
+            for (const std::vector<std::size_t>& numbers :
+                 {std::vector<std::size_t>{1}, std::vector<std::size_t>{0, 1, 2}}) {
+                SCOPED_TRACE(fmt::format("{} {} {}", bounds, name, numbers.size()));
+                Job job;
+                const auto saved =
+                    saveSequence(*farFrames(bounds, numbers), folder / name, {}, job);
+                ASSERT_TRUE(saved) << saved.error().text();
+                const auto notes = job.takeNotes();
+                ASSERT_EQ(notes.size(), 1u);
+                EXPECT_TRUE(notes[0].starts_with(
+                    "the coordinates are too large for 32-bit floats: the origin "));
+                const auto read = openSequence(folder / name, {}, job);
+                ASSERT_TRUE(read) << read.error().text();
+                const auto truth = farFrames(bounds, numbers);
+                for (std::size_t i = 0; i < numbers.size(); ++i) {
+                    const Bundle was = *truth->frame(i, job), is = *(*read)->frame(i, job);
+                    ASSERT_EQ(is.views.size(), was.views.size());
+                    for (std::size_t k = 0; k < was.views.size(); ++k) {
+                        EXPECT_LT(glm::distance(is.views[k].camera.position + is.origin,
+                                                was.views[k].camera.position),
+                                  1e-5);
+                        EXPECT_EQ(is.views[k].depth, was.views[k].depth);
+                    }
+                    ASSERT_TRUE(is.bounds);
+                    EXPECT_LT(glm::length(is.bounds->centre()), 1000);
+                }
+            }
 }
 
 TEST(FromOrigin, WhatFloatsHoldWellStaysAsItIs) {

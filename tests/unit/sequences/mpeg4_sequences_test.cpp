@@ -1,9 +1,11 @@
 // Bundles in time as MPEG-4 presentations: MovieTextures, commands, clocks, interpolators.
 
+#include "formats/any/open.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/mpeg4/mapping/media_clock.hpp"
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/mapping/sequence_write.hpp"
+#include "formats/mpeg4/mapping/view_notes.hpp"
 #include "formats/mpeg4/scene/interpolators.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/sequences/moving_views.hpp"
@@ -191,6 +193,100 @@ TEST(Mpeg4Sequences, ALastPictureStaysAsLongAsASampleCan) {
     EXPECT_EQ(document->findObjectDescriptor(2)->streams[0].samples.back().duration, 0xFFFFFFFFu);
 }
 
+namespace {
+
+/// The first frame of the moving views, again and again; from the second on its camera may be
+/// elsewhere.
+class RepeatedViews : public MovingViews {
+  public:
+    RepeatedViews(Timeline line, bool cameraMoves)
+        : MovingViews(std::move(line)), cameraMoves_(cameraMoves) {}
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        STX_TRY(auto bundle, MovingViews::frame(0, job));
+        if (cameraMoves_ && index > 0) bundle.views[1].camera.position.x += 1;
+        setTime(bundle, index);
+        return bundle;
+    }
+
+  private:
+    bool cameraMoves_;
+};
+
+Timeline endingAt(std::vector<double> times, double end) {
+    Timeline line;
+    line.times = std::move(times);
+    line.end = end;
+    line.findTick();
+    return line;
+}
+
+}  // namespace
+
+TEST(Mpeg4Sequences, TheEndOfAFilmIsKept) {
+    TemporaryFolder folder("ends");
+    const auto endOf = [&](Sequence& frames, const char* name) {
+        Job job;
+        const auto saved = saveSequence(frames, folder / name, {}, job);
+        EXPECT_TRUE(saved) << saved.error().text();
+        const auto read = openSequence(folder / name, {}, job);
+        EXPECT_TRUE(read) << read.error().text();
+        return read ? (*read)->timeline().end : -1;
+    };
+    for (const char* name : {"a.mp4", "a.bt", "a.xmt"}) {
+        RepeatedViews still(steadyTimeline(5, 10), false);
+        EXPECT_NEAR(endOf(still, name), 0.5, 1e-9) << name;
+        RepeatedViews moved(steadyTimeline(10, 10), true);
+        EXPECT_NEAR(endOf(moved, name), 1.0, 1e-9) << name;
+        RepeatedViews late(stx::moved(steadyTimeline(10, 10), 1.5e9), true);
+        EXPECT_NEAR(endOf(late, name), 1.5e9 + 1, 1e-6) << name;
+        // More ticks than a sample can last.
+        MovingViews longer(endingAt({0, 1.000001}, 8001.000001), false);
+        EXPECT_NEAR(endOf(longer, name), 8001.000001, 1e-6) << name;
+    }
+}
+
+TEST(Mpeg4Sequences, AMomentKeepsHowLongItIsShown) {
+    TemporaryFolder folder("moments");
+    Job job;
+    MovingViews moment(endingAt({3}, 10.25));
+    ASSERT_TRUE(saveSequence(moment, folder / "a.mp4", {}, job));
+    for (const char* name : {"b.mp4", "c.bt", "d.exr"}) {
+        const auto read = openSequence(folder / "a.mp4", {}, job);
+        ASSERT_TRUE(read) << read.error().text();
+        EXPECT_EQ((*read)->timeline().times, std::vector<double>{3});
+        EXPECT_EQ((*read)->timeline().end, 10.25);
+        ASSERT_TRUE(saveSequence(**read, folder / name, {}, job));
+        const auto again = openBundle(folder / name, {}, job);
+        ASSERT_TRUE(again) << again.error().text();
+        EXPECT_EQ(again->time, 3.0) << name;
+        EXPECT_EQ(again->duration, 7.25) << name;
+    }
+}
+
+TEST(Mpeg4Sequences, TheNoteIsThereWhereTheEndWouldBeLost) {
+    TemporaryFolder folder("duration_notes");
+    auto spool = PictureSpool::create(folder.path());
+    ASSERT_TRUE(spool);
+    const auto duration = [&](Sequence& frames) {
+        Job job;
+        const auto document = sceneFromSequence(frames, {}, *spool, job);
+        EXPECT_TRUE(document) << document.error().text();
+        const auto& root = std::get<ReplaceScene>(document->frames[0].commands[0]).root;
+        const auto& info = root->get<NodeList>("children")[0];
+        return ViewNotes::parse(info->get<std::vector<std::string>>("info")).duration;
+    };
+    MovingViews moving(5);
+    EXPECT_EQ(duration(moving), std::nullopt);
+    RepeatedViews repeated(steadyTimeline(5, 10), true);
+    EXPECT_EQ(duration(repeated), 0.5);
+    // The first frame of a film is not shown for all of it.
+    Job job;
+    const auto document = sceneFromSequence(repeated, {}, *spool, job);
+    const auto start = bundleFromScene(*document, {}, job);
+    ASSERT_TRUE(start) << start.error().text();
+    EXPECT_EQ(start->duration, std::nullopt);
+}
+
 TEST(ExrSequences, TimesThatHaveNoEndAreRefused) {
     TemporaryFolder folder("sequences");
     Job job;
@@ -226,6 +322,20 @@ TEST(MediaClock, FollowsCompositionTimesAndEdits) {
     shown = presentationOf(stream);
     EXPECT_EQ(shown.sampleAt(0.1, kSlack), 0u);
     EXPECT_EQ(shown.sampleAt(0.54, kSlack), 2u);
+}
+
+TEST(MediaClock, ADelayIsOneOfTheEditsToo) {
+    // A text's startTime before an .mp4 with B pictures.
+    ElementaryStream stream = streamOf({1000, 1040, 1080});
+    stream.samples[0].compositionOffset = 40;
+    stream.samples[1].compositionOffset = 80;
+    stream.edits = {1000, {{120, 40, 0x10000}}};
+    const Presentation shown = presentationOf(stream);
+    ASSERT_EQ(shown.shown.size(), 3u);
+    EXPECT_EQ(shown.sampleAt(1.0, kSlack), 0u);
+    EXPECT_EQ(shown.sampleAt(1.04, kSlack), 2u);
+    EXPECT_EQ(shown.sampleAt(1.08, kSlack), 1u);
+    EXPECT_NEAR(shown.duration, 1.12, 1e-9);
 }
 
 TEST(MediaClock, ShortListsDoNotBecomeLongOnes) {
