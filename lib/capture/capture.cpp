@@ -190,7 +190,7 @@ Result<Subject> subjectOf(const Mesh& whole, const std::vector<Camera>& cameras,
     const auto strays = findStrays(whole);
     if (!strays.pieces.empty()) {
         subject.withoutStrays = whole;
-        dropStrays(*subject.withoutStrays, strays);
+        STX_CHECK(dropStrays(*subject.withoutStrays, strays, job.limits));
     }
     const Mesh& mesh = subject.withoutStrays ? *subject.withoutStrays : whole;
     noteTranslucent(mesh, job);
