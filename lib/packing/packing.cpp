@@ -319,8 +319,9 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
         return fail(ErrorCode::invalidInput, "none of the {} views has a point to pack", count);
     STX_CHECK(checkAtlas(table, layout, contents, settings, job.limits));
     Atlas atlas = emptyAtlas(table, layout, contents, settings);
-    const bool tight = settings.layout == PackSettings::Layout::tight;
-    const std::vector<int> source = keptViews(table.about(), tight, layout.rectangles, job);
+    // Frames that are packed alike keep all views: a film has the same ones from start to end.
+    const bool drop = settings.layout == PackSettings::Layout::tight && !settings.contentOf;
+    const std::vector<int> source = keptViews(table.about(), drop, layout.rectangles, job);
     if (settings.objects) atlas.objects = keptObjects(*settings.objects, source);
     for (const int i : source) atlas.views.push_back(withoutImages(table.about().views[i]));
     atlas.rectangles = std::move(layout.rectangles);

@@ -20,9 +20,9 @@ struct PackSettings {
         grid,
         /// Views trimmed to their content (points, and pixels with partial coverage), cut into
         /// patches where that saves room, fitted closely, turned where that makes the textures
-        /// smaller. Views without content are dropped with a note. Pixels of full alpha without a
-        /// depth (pruned, or missed by a sensor) are left out and counted in
-        /// Atlas::sourcePixels.
+        /// smaller. Views without content are dropped with a note, but for frames that are packed
+        /// alike. Pixels of full alpha without a depth (pruned, or missed by a sensor) are left out
+        /// and counted in Atlas::sourcePixels.
         tight,
     };
     Layout layout = Layout::grid;
@@ -42,7 +42,7 @@ struct PackSettings {
     /// container.
     std::optional<std::uint64_t> bytesToWrite{};
     /// Of frames that are packed alike (PackPeriod::content()): the tight layout goes by these
-    /// views, in number and size those of the bundle; null = by the bundle itself.
+    /// views, in number and size those of the bundle, and keeps all; null = by the bundle itself.
     const Bundle* contentOf = nullptr;
 };
 
