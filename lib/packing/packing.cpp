@@ -465,10 +465,11 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
         // Whole views come back as they were, colours under alpha 0 included.
         if (covered < static_cast<std::int64_t>(given.count())) bleedColour(view.texture);
         // An atlas keeps room for normals when any view has them; give them back only to those.
+        // Zeros of emission say what no image says; those of metallic-roughness are a smooth
+        // surface that is no metal.
         dropIfZero(view.normal);
         dropIfZero(view.splatU);
         dropIfZero(view.splatV);
-        dropIfZero(view.metallicRoughness);
         dropIfZero(view.emissive);
     });
     STX_CHECK(job.checkCancelled());
