@@ -35,6 +35,7 @@ TEST(PackPeriod, FramesShareRectanglesAndKeepWhatEachNeeds) {
         Bundle frame = frames[f];
         const auto report = period.prune(frame);
         EXPECT_EQ(report.sourcePixels, frames[f].pointCount());
+        EXPECT_EQ(report.sourcePoints, frames[f].pointCount());
         EXPECT_EQ(report.keptPixels, frame.pointCount());
         EXPECT_LT(report.keptPixels, report.sourcePixels * 9 / 10);
         for (std::size_t v = 0; v < frame.views.size(); ++v)
