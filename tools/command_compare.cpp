@@ -90,9 +90,7 @@ Result<Scores> comparePair(const std::string& a, const std::string& b, const Com
     if (steadiness && asFloats) steadiness->add(*pair.first(), *pair.second(), settings);
     if (steadiness && !asFloats) steadiness->add(first.coded, second.coded, settings);
     if (!o.errorPicture.empty()) {
-        STX_TRY(const auto picture,
-                asFloats ? errorPicture(*pair.first(), *pair.second(), settings, o.gain)
-                         : errorPicture(first.coded, second.coded, settings, o.gain));
+        STX_TRY(const auto picture, pair.errorPicture(asked, o.gain));
         STX_TRY(const auto png,
                 encodePng(picture.width(), picture.height(), 4, 8, picture.data(), true));
         STX_CHECK(writeFile(o.errorPicture, png, program.outputOptions()));

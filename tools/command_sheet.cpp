@@ -51,13 +51,20 @@ Texture textureOf(Picture picture) {
 Result<std::vector<SheetPair>> pairsOfPictures(const SheetOptions& o, Job& job) {
     STX_TRY(auto a, openPicture(o.inputs[0], job));
     // Both, as they are and for the sheet, and their difference.
-    STX_CHECK(checkPeak(a.isLinear() ? peak::kComparedLinear : peak::kCompared, a.coded.count(), 0,
-                        0, job.limits));
+    const bool wide = a.isLinear() || !a.fine.empty();
+    STX_CHECK(checkPeak(wide ? peak::kComparedLinear : peak::kCompared, a.coded.count(), 0, 0,
+                        job.limits));
     STX_TRY(auto b, openPicture(o.inputs[1], job));
     std::vector<SheetPair> pairs(1);
-    pairs[0].title = fileName(o.inputs[0]) + " | " + fileName(o.inputs[1]);
-    pairs[0].a = textureOf(std::move(a));
-    pairs[0].b = textureOf(std::move(b));
+    SheetPair& pair = pairs[0];
+    pair.title = fileName(o.inputs[0]) + " | " + fileName(o.inputs[1]);
+    // The sheet shows 8 bits, and the figures are those of stx compare.
+    ColourError& error = pair.error.emplace();
+    STX_TRY(error.found, within(pair.title, compare(a, b, {}, job)));
+    STX_TRY(error.picture,
+            within(pair.title, PicturePair(a, b).errorPicture({}, ColourError::kGain)));
+    pair.a = textureOf(std::move(a));
+    pair.b = textureOf(std::move(b));
     return pairs;
 }
 

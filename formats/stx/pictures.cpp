@@ -152,7 +152,7 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
     return picture;
 }
 
-PicturePair::PicturePair(const Picture& a, const Picture& b) {
+PicturePair::PicturePair(const Picture& a, const Picture& b) : a_(a), b_(b) {
     linear_ = a.isLinear() && b.isLinear();
     if (linear_) {
         first_ = &a.linear;
@@ -172,6 +172,12 @@ CompareSettings PicturePair::settings(CompareSettings asked) const {
     if (linear_)
         for (int c = 0; c < 3; ++c) asked.background[c] = linearFromSrgb(asked.background[c]);
     return asked;
+}
+
+Result<Rgba8Image> PicturePair::errorPicture(const CompareSettings& asked, double gain) const {
+    const CompareSettings own = settings(asked);
+    if (!first_) return stx::errorPicture(a_.coded, b_.coded, own, gain);
+    return stx::errorPicture(*first_, *second_, own, gain);
 }
 
 double inCodes16(double difference) {

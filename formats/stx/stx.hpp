@@ -265,8 +265,11 @@ class PicturePair {
     [[nodiscard]] CompareSettings settings(CompareSettings asked) const;
     /// Whether codes of 16 bits are compared: differences of the floats are for inCodes16().
     [[nodiscard]] bool codes16() const { return first_ && !linear_; }
+    /// errorPicture() of what is compared; the background of `asked` is sRGB-coded.
+    [[nodiscard]] Result<Rgba8Image> errorPicture(const CompareSettings& asked, double gain) const;
 
   private:
+    const Picture &a_, &b_;
     const RgbaFloatImage *first_ = nullptr, *second_ = nullptr;
     RgbaFloatImage made_;
     bool linear_ = false;

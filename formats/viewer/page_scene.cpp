@@ -212,7 +212,6 @@ Result<std::vector<PageImages>> PageScene::add(const Atlas& atlas, Job& job) {
     if (atlas.views.empty()) return pages;
     STX_CHECK(atlas.check());
     padding_ = atlas.padding;
-    partial_ = partial_ || atlas.keptPixels < atlas.sourcePixels;
     const auto firstView = static_cast<int>(views_.size()), firstPage = static_cast<int>(pages_);
     const bool ofViews = colours_.copies && std::ranges::all_of(atlas.views, [](const auto& v) {
                              return v.colourFile.jpeg != nullptr;
@@ -223,6 +222,7 @@ Result<std::vector<PageImages>> PageScene::add(const Atlas& atlas, Job& job) {
         pruned_ = pruned_ || view.pruned;
         Json v = pageCamera(view.camera, view.name);
         v["noDepth"] = nameOf(view.noDepth);
+        v["pruned"] = view.pruned;
         v["nearPlane"] = view.nearPlane;
         v["farPlane"] = view.farPlane;
         v["dmax"] = view.depthCode().dmax;
@@ -249,7 +249,6 @@ Json PageScene::description(Json pages) const {
     Json j;
     j["padding"] = padding_;
     j["pruned"] = pruned_;
-    j["partial"] = partial_;
     j["views"] = views_;
     j["rectangles"] = rectangles_;
     j["pages"] = std::move(pages);

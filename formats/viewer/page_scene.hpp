@@ -53,7 +53,7 @@ class PageScene {
 
   private:
     PageColours colours_;
-    bool pruned_ = false, partial_ = false;
+    bool pruned_ = false;
     int padding_ = 0;
     std::size_t pages_ = 0;
     nlohmann::ordered_json views_ = nlohmann::ordered_json::array(),

@@ -94,7 +94,7 @@ class Scene {
         scene.prepare(programs.prepare, pages, data.padding);
         scene.findBlocks(pages);
         scene.findSmooth(programs.smooth);
-        scene.makeCover(pages, data.padding, data.partial);
+        scene.makeCover(pages, data.padding);
         return scene;
     }
 
@@ -232,7 +232,7 @@ class Scene {
     }
 
     // What each view saw of the object's outline: a layer of alpha for each.
-    makeCover(pages, padding, partial) {
+    makeCover(pages, padding) {
         const gl = this.gl, views = this.views;
         const width = Math.max(...views.map((v) => v.width)), height = Math.max(...views.map((v) => v.height));
         const most = Math.min(gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS), Math.floor(256e6 / (width * height)));
@@ -249,21 +249,22 @@ class Scene {
             }
         });
         // Beside a rectangle its padding shows the view.
-        const known = covers.map((cover) => new Uint8Array(partial ? cover.length : 0));
+        const known = covers.map((cover, n) => new Uint8Array(views[n].pruned ? cover.length : 0));
         eachTexel((r, x, y, texel) => {
             if (r.view >= covers.length) return;
             covers[r.view][y * width + x] = pages[r.page].colour.values[4 * texel + 3];
-            if (partial) known[r.view][y * width + x] = 1;
+            if (views[r.view].pruned) known[r.view][y * width + x] = 1;
         }, Math.min(padding, 2));
         // Pixels that were left out because other views show them are no background: outsideBits() of lib/packing.
-        if (partial) {
+        const pruned = [...covers.keys()].filter((n) => views[n].pruned);
+        if (pruned.length > 0) {
             eachTexel((r, x, y, texel) => {
                 const code = pages[r.page].depth.values[texel], from = views[r.view];
                 if (code === 0) return;
                 const dist = from.nearPlane + (1 - (code - 1) / (from.dmax - 1)) * (from.farPlane - from.nearPlane);
                 const point = pointAt(from, x + 0.5, y + 0.5, dist), spacing = (from.orthographic ? 1 : dist) / from.fx;
-                covers.forEach((cover, n) => {
-                    const v = views[n], q = into(v, minus(point, v.position)), k = v.orthographic ? 1 : -1 / q[2];
+                pruned.forEach((n) => {
+                    const cover = covers[n], v = views[n], q = into(v, minus(point, v.position)), k = v.orthographic ? 1 : -1 / q[2];
                     if (n === r.view || !(v.orthographic || q[2] < 0)) return;
                     const px = Math.floor(v.cx + v.fx * q[0] * k), py = Math.floor(v.cy - v.fy * q[1] * k);
                     const reach = 1 + Math.floor(Math.min(spacing * v.fx * k, kMostReach - 1));

@@ -35,26 +35,35 @@ Texture straightTexture(const Image<glm::vec4>& premultiplied, bool& clipped) {
     return texture;
 }
 
-/// Blended, and not opaque everywhere: by its factor, its texture or its vertices' colours.
-bool isTranslucent(const Mesh& mesh, std::size_t material) {
-    const Material& m = mesh.materials[material];
-    if (m.alpha != Material::Alpha::blend) return false;
-    if (m.baseColour.a < 1.0f) return true;
-    if (m.baseColourTexture >= 0) {
+/// Which materials are blended and not opaque everywhere: by their factor, their texture or their
+/// vertices' colours. Each texture is looked at once, however many materials share it.
+std::vector<bool> translucentMaterials(const Mesh& mesh) {
+    std::vector<std::optional<bool>> glass(mesh.textures.size());
+    const auto isGlass = [&](int number) {
+        std::optional<bool>& known = glass[static_cast<std::size_t>(number)];
         // What is there or not is a hole, not glass.
-        const auto& texture = mesh.textures[static_cast<std::size_t>(m.baseColourTexture)];
-        if (std::ranges::any_of(texture.pixels.pixels(),
-                                [](glm::u8vec4 p) { return p.a > 0 && p.a < 255; }))
-            return true;
+        if (!known)
+            known =
+                std::ranges::any_of(mesh.textures[static_cast<std::size_t>(number)].pixels.pixels(),
+                                    [](glm::u8vec4 p) { return p.a > 0 && p.a < 255; });
+        return *known;
+    };
+    std::vector<bool> translucent(mesh.materials.size());
+    for (std::size_t i = 0; i < mesh.materials.size(); ++i) {
+        const Material& m = mesh.materials[i];
+        translucent[i] =
+            m.alpha == Material::Alpha::blend &&
+            (m.baseColour.a < 1.0f || (m.baseColourTexture >= 0 && isGlass(m.baseColourTexture)));
     }
-    if (mesh.colours.empty()) return false;
+    if (mesh.colours.empty()) return translucent;
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-        if (mesh.triangleMaterial[i] != material) continue;
+        const std::uint32_t material = mesh.triangleMaterial[i];
+        if (mesh.materials[material].alpha != Material::Alpha::blend) continue;
         const auto& t = mesh.triangles[i];
         if (mesh.colours[t.x].a < 1.0f || mesh.colours[t.y].a < 1.0f || mesh.colours[t.z].a < 1.0f)
-            return true;
+            translucent[material] = true;
     }
-    return false;
+    return translucent;
 }
 
 /// "material 'a' is", "material 'a' and 2 more are": those of which `what` is true; empty without.
@@ -75,7 +84,8 @@ std::string materialsAre(const Mesh& mesh, const What& what) {
 
 /// Says what becomes of glass: a view has one depth a pixel.
 void noteTranslucent(const Mesh& mesh, Job& job) {
-    const auto which = materialsAre(mesh, [&](std::size_t i) { return isTranslucent(mesh, i); });
+    const auto translucent = translucentMaterials(mesh);
+    const auto which = materialsAre(mesh, [&](std::size_t i) { return translucent[i]; });
     if (which.empty()) return;
     job.note(which +
              " translucent: a pixel has the depth of the surface that shows most there; its colour "
@@ -190,7 +200,7 @@ Result<Subject> subjectOf(const Mesh& whole, const std::vector<Camera>& cameras,
     const auto strays = findStrays(whole);
     if (!strays.pieces.empty()) {
         subject.withoutStrays = whole;
-        dropStrays(*subject.withoutStrays, strays);
+        STX_CHECK(dropStrays(*subject.withoutStrays, strays, job.limits));
     }
     const Mesh& mesh = subject.withoutStrays ? *subject.withoutStrays : whole;
     noteTranslucent(mesh, job);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 
 #include "lib/model/splat_cloud.hpp"
 
@@ -77,6 +78,18 @@ Bounds boundsOfSplats(const Mesh& mesh, const Strays& strays) {
     return bounds;
 }
 
+/// A cloud in which the strays are transparent: numbers of splats are those of vertices, so they
+/// keep their places.
+Result<std::shared_ptr<const SplatCloud>> withoutStrays(const Mesh& mesh, const Strays& strays,
+                                                        const Limits& limits) {
+    const SplatCloud& whole = *mesh.splats;
+    STX_CHECK(limits.checkAllocation(whole.positions.size(), SplatCloud::bytesEach(whole.degree),
+                                     "the splats without those far outside"));
+    auto cloud = std::make_shared<SplatCloud>(whole);
+    for (const std::uint64_t piece : strays.pieces) cloud->opacities[mesh.points[piece]] = 0;
+    return cloud;
+}
+
 }  // namespace
 
 Strays findStrays(std::uint64_t count, const std::function<Piece(std::uint64_t)>& piece) {
@@ -142,8 +155,9 @@ void noteStrays(const Strays& strays, std::uint64_t count, const char* what, glm
                     one ? "at" : "the farthest at", at.x, at.y, at.z, one ? "it" : "them"));
 }
 
-void dropStrays(Mesh& mesh, const Strays& strays) {
-    if (strays.pieces.empty()) return;
+Result<void> dropStrays(Mesh& mesh, const Strays& strays, const Limits& limits) {
+    if (strays.pieces.empty()) return {};
+    if (mesh.splats) STX_SET(mesh.splats, withoutStrays(mesh, strays, limits));
     const auto triangles = mesh.triangles.size();
     std::size_t next = 0, keptTriangles = 0, keptPoints = 0;
     const auto stray = [&](std::uint64_t i) {
@@ -162,6 +176,7 @@ void dropStrays(Mesh& mesh, const Strays& strays) {
     mesh.triangles.resize(keptTriangles);
     mesh.triangleMaterial.resize(keptTriangles);
     mesh.points.resize(keptPoints);
+    return {};
 }
 
 }  // namespace stx

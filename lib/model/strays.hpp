@@ -38,7 +38,8 @@ struct Strays {
 void noteStrays(const Strays& strays, std::uint64_t count, const char* what, glm::dvec3 shift,
                 Job& job);
 
-/// Takes the strays out of a mesh; its vertices stay.
-void dropStrays(Mesh& mesh, const Strays& strays);
+/// Takes the strays out of a mesh; its vertices stay, and splats become transparent in a copy of
+/// their cloud. Errors (invalidInput): that copy is over the memory limit.
+[[nodiscard]] Result<void> dropStrays(Mesh& mesh, const Strays& strays, const Limits& limits);
 
 }  // namespace stx

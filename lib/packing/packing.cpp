@@ -104,13 +104,12 @@ ReferenceView withoutImages(const ReferenceView& view) {
     return v;
 }
 
-/// Pixels of a view that neither rectangles nor padding show: full alpha where other views show
-/// something, else background.
-void fillOutside(const Atlas& atlas, const Image<std::uint8_t>& given, std::size_t view,
+/// Pixels of a view that neither rectangles nor padding show: full alpha where outsideBits() says
+/// so, else background.
+void fillOutside(const std::vector<std::uint64_t>& outside, const Image<std::uint8_t>& given,
                  Texture& texture) {
-    const auto shown = outsideBits(atlas, view);
     for (std::size_t i = 0; i < given.count(); ++i) {
-        if (given.data()[i] || !(shown[i / 64] >> (i % 64) & 1)) continue;
+        if (given.data()[i] || !(outside[i / 64] >> (i % 64) & 1)) continue;
         if (auto* image = texture.rgba8()) image->data()[i].a = 255;
         if (auto* image = texture.rgbaFloat()) image->data()[i].a = 1.0f;
     }
@@ -319,8 +318,9 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
         return fail(ErrorCode::invalidInput, "none of the {} views has a point to pack", count);
     STX_CHECK(checkAtlas(table, layout, contents, settings, job.limits));
     Atlas atlas = emptyAtlas(table, layout, contents, settings);
-    const bool tight = settings.layout == PackSettings::Layout::tight;
-    const std::vector<int> source = keptViews(table.about(), tight, layout.rectangles, job);
+    // Frames that are packed alike keep all views: a film has the same ones from start to end.
+    const bool drop = settings.layout == PackSettings::Layout::tight && !settings.contentOf;
+    const std::vector<int> source = keptViews(table.about(), drop, layout.rectangles, job);
     if (settings.objects) atlas.objects = keptObjects(*settings.objects, source);
     for (const int i : source) atlas.views.push_back(withoutImages(table.about().views[i]));
     atlas.rectangles = std::move(layout.rectangles);
@@ -362,6 +362,8 @@ bool lacksDepthByMask(const ReferenceView& view) {
 
 std::vector<std::uint64_t> outsideBits(const Atlas& atlas, std::size_t of) {
     constexpr int kMostReach = 6;  // pixels
+    // What a view saw of the object is in its rectangles, unless it was pruned or missed.
+    if (atlas.keptPixels >= atlas.sourcePixels || !atlas.views[of].depthMayBeUnknown()) return {};
     const Camera& camera = atlas.views[of].camera;
     std::vector<std::uint64_t> bits(
         (static_cast<std::size_t>(camera.width) * camera.height + 63) / 64, 0);
@@ -423,8 +425,6 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     STX_CHECK(
         job.limits.checkAllocation(pixels, contents.bytesPerPixel() + 1, "the views of the atlas"));
 
-    // Something of the object is in no rectangle: pruned, or missed by a sensor.
-    const bool partial = atlas.keptPixels < atlas.sourcePixels;
     std::vector<std::vector<const AtlasRectangle*>> ofView(atlas.views.size());
     for (const auto& r : atlas.rectangles) ofView[r.view].push_back(&r);
     Bundle bundle;
@@ -435,17 +435,16 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     bundle.time = atlas.time;
     bundle.duration = atlas.duration;
     bundle.views.resize(atlas.views.size());
-    std::vector<Image<std::uint8_t>> givenOf(atlas.views.size());
-    parallelFor(0, atlas.views.size(), [&](std::int64_t i) {
+    parallelFor(0, atlas.views.size(), [&](std::size_t i) {
         ReferenceView& view = bundle.views[i];
         view = withoutImages(atlas.views[i]);
         const int width = view.camera.width, height = view.camera.height;
         view.texture = emptyTexture(width, height, contents.linear);
         view.depth = Image<float>(width, height, kNoDepth);
         makeFurther(contents, width, height, view);
-        Image<std::uint8_t>& given = givenOf[i];  // 1 = by padding, 2 = by a rectangle
-        given = Image<std::uint8_t>(width, height, 0);
-        if (partial) {
+        Image<std::uint8_t> given(width, height, 0);  // 1 = by padding, 2 = by a rectangle
+        const auto outside = outsideBits(atlas, i);
+        if (!outside.empty()) {
             for (const AtlasRectangle* r : ofView[i]) copyPadding(*r, atlas, view, given);
         }
         std::int64_t covered = 0;
@@ -463,19 +462,16 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
         }
         // Whole views come back as they were, colours under alpha 0 included.
         if (covered < static_cast<std::int64_t>(given.count())) bleedColour(view.texture);
+        if (!outside.empty()) fillOutside(outside, given, view.texture);
         // An atlas keeps room for normals when any view has them; give them back only to those.
+        // Zeros of emission say what no image says; those of metallic-roughness are a smooth
+        // surface that is no metal.
         dropIfZero(view.normal);
         dropIfZero(view.splatU);
         dropIfZero(view.splatV);
-        dropIfZero(view.metallicRoughness);
         dropIfZero(view.emissive);
     });
     STX_CHECK(job.checkCancelled());
-    if (partial) {
-        parallelFor(0, bundle.views.size(), [&](std::int64_t i) {
-            fillOutside(atlas, givenOf[i], static_cast<std::size_t>(i), bundle.views[i].texture);
-        });
-    }
     return bundle;
 }
 

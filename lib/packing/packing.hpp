@@ -20,9 +20,9 @@ struct PackSettings {
         grid,
         /// Views trimmed to their content (points, and pixels with partial coverage), cut into
         /// patches where that saves room, fitted closely, turned where that makes the textures
-        /// smaller. Views without content are dropped with a note. Pixels of full alpha without a
-        /// depth (pruned, or missed by a sensor) are left out and counted in
-        /// Atlas::sourcePixels.
+        /// smaller. Views without content are dropped with a note, but for frames that are packed
+        /// alike. Pixels of full alpha without a depth (pruned, or missed by a sensor) are left out
+        /// and counted in Atlas::sourcePixels.
         tight,
     };
     Layout layout = Layout::grid;
@@ -42,7 +42,7 @@ struct PackSettings {
     /// container.
     std::optional<std::uint64_t> bytesToWrite{};
     /// Of frames that are packed alike (PackPeriod::content()): the tight layout goes by these
-    /// views, in number and size those of the bundle; null = by the bundle itself.
+    /// views, in number and size those of the bundle, and keeps all; null = by the bundle itself.
     const Bundle* contentOf = nullptr;
 };
 
@@ -79,17 +79,19 @@ struct JoinedObjects {
 [[nodiscard]] bool lacksDepthByMask(const ReferenceView& view);
 
 /// A bit for each pixel of a view, row by row: set where the object is, or may be, even where no
-/// rectangle shows it. That is where points of other views fall, a little generously, and
+/// rectangle shows it. Empty, as if none were set, where nothing of the object is missing: in
+/// atlases with all its pixels (keptPixels = sourcePixels), and of views that are neither pruned
+/// nor have unknown depth. Else that is where points of other views fall, a little generously, and
 /// everywhere in a view whose missing depth is unknown, unless its rectangles and their padding
 /// show that it is masked as lacksDepthByMask() says. The atlas must pass check().
 [[nodiscard]] std::vector<std::uint64_t> outsideBits(const Atlas& atlas, std::size_t view);
 
 /// The bundle of an atlas: every pixel of every rectangle back in its view. Pixels in no rectangle
-/// are coloured from the nearest covered ones and are background (alpha 0). When the atlas lacks
-/// pixels of the object (keptPixels < sourcePixels: pruned, or missed by a sensor), those where
-/// points of other views fall have full alpha instead (the object is there, another view gives its
-/// distance), and next to rectangles the padding decides. unpack(pack(b)) == b for points and
-/// pixels of partial coverage. Errors: an atlas that fails check(), memory over the limit.
+/// are coloured from the nearest covered ones and are background (alpha 0). Of views that lack
+/// pixels those in outsideBits() have full alpha instead (the object is there, another view gives
+/// its distance), and next to rectangles the padding decides. unpack(pack(b)) == b for points and
+/// pixels of partial coverage. Views without metallic-roughness come back with zeros where others
+/// have it. Errors: an atlas that fails check(), memory over the limit.
 [[nodiscard]] Result<Bundle> unpack(const Atlas& atlas, Job& job);
 
 }  // namespace stx

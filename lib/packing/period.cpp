@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "lib/base/parallel.hpp"
+#include "lib/packing/layout.hpp"
 
 namespace stx {
 namespace {
@@ -47,14 +48,17 @@ Result<void> PackPeriod::add(const Bundle& whole, const Bundle& pruned) {
 
 PruneReport PackPeriod::prune(Bundle& frame) const {
     PruneReport report;
-    report.sourcePixels = frame.pointCount();
+    report.sourcePoints = frame.pointCount();
     report.psnr = std::numeric_limits<double>::quiet_NaN();
+    std::vector<std::int64_t> object(frame.views.size());
     parallelFor(0, frame.views.size(), [&](std::size_t k) {
+        object[k] = objectPixels(frame.views[k]);
         Image<std::uint8_t> kept = views_[k].kept;
         for (std::size_t p = 0; p < kept.count(); ++p)
             kept.data()[p] &= hasPoint(frame.views[k].depth.data()[p]) ? 1 : 0;
         keepOnly(kept, frame.views[k]);
     });
+    for (const std::int64_t n : object) report.sourcePixels += n;
     report.keptPixels = frame.pointCount();
     for (const auto& v : frame.views) report.emptiedViews += v.pointCount() == 0 ? 1 : 0;
     return report;

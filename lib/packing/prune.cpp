@@ -434,21 +434,25 @@ Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& setting
     Pruning out;
     PruneReport& report = out.report;
     std::vector<PruneView> views(table.count());
-    std::vector<std::int64_t> points(table.count()), unmeasured(table.count());
+    std::vector<std::int64_t> points(table.count()), object(table.count());
     out.noDepth.resize(table.count());
     STX_CHECK(forEachView(
         table, kPreparing, job,
         [&](std::size_t i, const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
             views[i] = preparePruning(*view);
             points[i] = view->pointCount();
+            object[i] = objectPixels(*view);
             out.noDepth[i] = lacksDepthByMask(*view) ? NoDepth::empty : view->noDepth;
-            if (out.noDepth[i] == NoDepth::unknown && !view->pruned && !view->background)
-                unmeasured[i] = objectPixels(*view) - points[i];
             return {};
         }));
-    for (const std::int64_t n : points) report.sourcePixels += n;
-    for (const std::int64_t n : unmeasured) report.unmeasuredPixels += n;
-    const std::vector<int> rank = rankViews(views, report.sourcePixels);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        report.sourcePixels += object[i];
+        report.sourcePoints += points[i];
+        const ViewHeader& header = table.about().views[i];
+        if (out.noDepth[i] == NoDepth::unknown && !header.pruned && !header.background)
+            report.unmeasuredPixels += object[i] - points[i];
+    }
+    const std::vector<int> rank = rankViews(views, report.sourcePoints);
     for (PruneView& v : views) {
         // In their room: what is freed between the views is seldom given back.
         v.errors = std::move(v.depths);
@@ -471,7 +475,7 @@ Result<Pruning> findPruning(const ViewTable& table, const PruneSettings& setting
         kept += grown.added;
         for (std::size_t i = 0; i < views.size(); ++i) views[i].kept = std::move(grown.kept[i]);
     }
-    const double all = static_cast<double>(std::max<std::int64_t>(report.sourcePixels, 1));
+    const double all = static_cast<double>(std::max<std::int64_t>(report.sourcePoints, 1));
     if (settings.minPsnr > 0) {
         giveBack(views, budget, all * std::pow(10.0, -settings.minPsnr / 10));
     } else if (settings.budget > 0) {

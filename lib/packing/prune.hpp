@@ -31,8 +31,9 @@ struct PruneSettings {
 };
 
 struct PruneReport {
-    std::int64_t sourcePixels = 0;  ///< object pixels before
-    std::int64_t keptPixels = 0;    ///< and after
+    std::int64_t sourcePixels = 0;  ///< before: points, and full alpha without a distance
+    std::int64_t sourcePoints = 0;  ///< of these the points, which alone are pruned
+    std::int64_t keptPixels = 0;    ///< points after
     double psnr = 0;                ///< estimate, dB; infinity when nothing was lost
     int emptiedViews = 0;           ///< views without a pixel left
     /// Pixels that have colours but no depth, of views that fill their frames: prune() keeps them.

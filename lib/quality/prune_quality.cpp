@@ -77,10 +77,12 @@ Result<double> psnrOf(const ViewTable& table, const Pruning& pruning, const View
     return psnr.worst;
 }
 
-/// What keeps all.
-Pruning nothingPruned(const ViewTable& table, std::int64_t points) {
+/// What keeps all; `tried` is the report of another attempt.
+Pruning nothingPruned(const ViewTable& table, const PruneReport& tried) {
     Pruning out;
-    out.report.sourcePixels = out.report.keptPixels = points;
+    out.report = tried;
+    out.report.keptPixels = tried.sourcePoints;
+    out.report.emptiedViews = 0;
     out.report.psnr = std::numeric_limits<double>::infinity();
     out.changed.resize(table.count(), false);
     for (const ReferenceView& view : table.about().views)
@@ -102,14 +104,14 @@ Result<Pruning> findPruningToQuality(const ViewTable& table, const PruneSettings
     STX_TRY(const auto quality, picturesBefore(table, quiet));
     std::optional<Pruning> best;
     std::vector<std::string> notes;  // of the best
-    std::int64_t points = 0;
+    PruneReport tried;
     const auto reaches = [&](double estimate) -> Result<bool> {
         Job attempt;
         attempt.workFor(job);
         PruneSettings now = settings;
         now.minPsnr = estimate;
         STX_TRY(auto pruned, findPruning(table, now, attempt));
-        points = pruned.report.sourcePixels;
+        tried = pruned.report;
         auto said = attempt.takeNotes();
         STX_TRY(pruned.report.psnr, psnrOf(table, pruned, quality, quiet));
         if (!(pruned.report.psnr >= wantedPsnr)) return false;
@@ -129,13 +131,13 @@ Result<Pruning> findPruningToQuality(const ViewTable& table, const PruneSettings
     }
     for (auto& note : notes) job.note(std::move(note));
     if (best) return std::move(*best);
-    if (settings.budget > 0 && settings.budget < points)
+    if (settings.budget > 0 && settings.budget < tried.sourcePoints)
         return fail(ErrorCode::invalidInput,
                     "a budget of {} pixels and {:g} dB cannot both be had: allow more pixels or "
                     "ask for less",
                     settings.budget, wantedPsnr);
     job.note(fmt::format("nothing is pruned: {:g} dB are reached by all pixels only", wantedPsnr));
-    return nothingPruned(table, points);
+    return nothingPruned(table, tried);
 }
 
 Result<PruneReport> pruneToQuality(Bundle& bundle, const PruneSettings& settings, double wantedPsnr,

@@ -10,7 +10,6 @@
 namespace stx {
 namespace {
 
-constexpr double kGain = 8.0;  ///< of the error: white is a difference of 1/8 of the full range
 /// Where only one of two has a depth.
 constexpr glm::u8vec3 kOnlyOne{255, 0, 255};
 
@@ -25,21 +24,19 @@ Rgba8Image codedOf(const Texture& texture) {
     return out;
 }
 
-struct ColourError {
-    Comparison found;
-    Rgba8Image picture;
-};
-
-Result<ColourError> colourError(const Texture& a, const Texture& b) {
+Result<ColourError> colourError(const SheetPair& pair) {
+    if (pair.error) return *pair.error;
+    const Texture &a = pair.a, &b = pair.b;
     ColourError error;
     if (a.isLinear() && b.isLinear()) {
         STX_TRY(error.found, compare(*a.rgbaFloat(), *b.rgbaFloat()));
-        STX_TRY(error.picture, errorPicture(*a.rgbaFloat(), *b.rgbaFloat(), {}, kGain));
+        STX_TRY(error.picture,
+                errorPicture(*a.rgbaFloat(), *b.rgbaFloat(), {}, ColourError::kGain));
         return error;
     }
     const Rgba8Image first = codedOf(a), second = codedOf(b);
     STX_TRY(error.found, compare(first, second));
-    STX_TRY(error.picture, errorPicture(first, second, {}, kGain));
+    STX_TRY(error.picture, errorPicture(first, second, {}, ColourError::kGain));
     return error;
 }
 
@@ -125,10 +122,10 @@ Result<Sheet> sheetOf(const std::vector<SheetPair>& pairs, const SheetSettings& 
             groups.back().tiles.push_back(depthError(pair.depthA, pair.depthB, plan.cell));
             continue;
         }
-        STX_TRY(auto error, within(pair.title, colourError(pair.a, pair.b)));
+        STX_TRY(auto error, within(pair.title, colourError(pair)));
         total.add(error.found);
         if (!shown) continue;
-        groups.push_back({{pair.title, fmt::format("PSNR {}, SSIM {:.4f}, worst {:.4g} at {} {}",
+        groups.push_back({{pair.title, fmt::format("PSNR {}, SSIM {:.4f}, worst {:g} at {} {}",
                                                    decibels(error.found.psnrRgb), error.found.ssimY,
                                                    error.found.worst.difference,
                                                    error.found.worst.x, error.found.worst.y)},
@@ -136,7 +133,7 @@ Result<Sheet> sheetOf(const std::vector<SheetPair>& pairs, const SheetSettings& 
         groups.back().tiles.push_back(colourTile(pair.a, plan.cell));
         groups.back().tiles.push_back(colourTile(pair.b, plan.cell));
         Tile heat{shrunk(Texture(std::move(error.picture)), plan.cell),
-                  fmt::format("error, {:g} times", kGain)};
+                  fmt::format("error, {:g} times", ColourError::kGain)};
         groups.back().tiles.push_back(std::move(heat));
         job.progress(i + 1, content.groups, "pairs");
     }

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <glm/glm.hpp>
 
 #include "lib/base/job.hpp"
+#include "lib/metrics/compare.hpp"
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/sequence.hpp"
@@ -48,11 +50,21 @@ struct Sheet {
 /// depth of a view has one range over all of its moments.
 [[nodiscard]] Result<Sheet> sheetOf(Sequence& frames, const SheetSettings& settings, Job& job);
 
+/// How far the colours of two pictures are apart.
+struct ColourError {
+    /// Of `picture`: white is a difference of 1/8 of the full range.
+    static constexpr double kGain = 8.0;
+    Comparison found;
+    Rgba8Image picture;  ///< as errorPicture() has it
+};
+
 /// Two pictures of one thing, straight alpha.
 struct SheetPair {
     std::string title;
     Texture a, b;
     Image<float> depthA, depthB;  ///< empty: none
+    /// Of what is finer than `a` and `b` show; nothing: it is found from these.
+    std::optional<ColourError> error{};
 };
 
 /// Pairs side by side with the error: differences of colour as errorPicture() has them, with the

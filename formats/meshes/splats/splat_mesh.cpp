@@ -3,6 +3,7 @@
 #include "formats/meshes/mesh_builder.hpp"
 #include "formats/meshes/readers.hpp"
 #include "lib/geometry/origin.hpp"
+#include "lib/model/strays.hpp"
 
 namespace stx {
 namespace {
@@ -51,7 +52,9 @@ Result<Mesh> meshOfSplats(FileSplats splats, Job& job) {
     // The bounds count from a splat, so that floats round them as little as the object.
     const glm::dvec3 near = centres[mesh.points.front()];
     mesh.positions = from(near, centres);
-    Bounds bounds = mesh.bounds();
+    const Strays strays = findStrays(mesh);
+    noteStrays(strays, mesh.points.size(), "splats", near, job);
+    Bounds bounds = strays.bounds;
     bounds.min += near;
     bounds.max += near;
     mesh.origin = originFor(bounds);

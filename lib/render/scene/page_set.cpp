@@ -147,12 +147,8 @@ Result<PageSet> PageSet::of(const Atlas& atlas, Job& job) {
     }
     buildIndex(*data);
     PageSet set(data);
-    if (atlas.keptPixels < atlas.sourcePixels) {
-        std::vector<std::vector<std::uint64_t>> bits(data->views.size());
-        parallelFor(0, bits.size(),
-                    [&](std::size_t view) { bits[view] = outsideBits(atlas, view); });
-        for (std::size_t i = 0; i < bits.size(); ++i) data->index[i].outside = std::move(bits[i]);
-    }
+    parallelFor(0, data->index.size(),
+                [&](std::size_t view) { data->index[view].outside = outsideBits(atlas, view); });
     STX_CHECK(job.checkCancelled());
     return set;
 }

@@ -201,5 +201,22 @@ TEST(CapturedMaterials, AnotherSizeIsRefused) {
     EXPECT_NE(ok.error().text().find("emissive 3x3"), std::string::npos) << ok.error().text();
 }
 
+TEST(Materials, SmoothPlasticComesBackFromAnAtlas) {
+    Material smooth;
+    smooth.metallic = smooth.roughness = 0;
+    smooth.hasMetallicRoughness = true;
+    CaptureSettings settings;
+    settings.materials = true;
+    Job job;
+    const auto bundle = captureBundle(square(smooth, {}), {before()}, settings, job);
+    ASSERT_TRUE(bundle);
+    ASSERT_FALSE(bundle->views[0].metallicRoughness.empty());
+    const auto atlas = pack(*bundle, {}, job);
+    ASSERT_TRUE(atlas);
+    const auto unpacked = unpack(*atlas, job);
+    ASSERT_TRUE(unpacked);
+    EXPECT_EQ(unpacked->views[0].metallicRoughness, bundle->views[0].metallicRoughness);
+}
+
 }  // namespace
 }  // namespace stx

@@ -6,6 +6,7 @@
 #include "lib/capture/rasterizer.hpp"
 #include "lib/geometry/depth_code.hpp"
 #include "lib/geometry/view_layout.hpp"
+#include "lib/model/splat_cloud.hpp"
 
 namespace stx {
 namespace {
@@ -105,6 +106,38 @@ TEST(Strays, OnePointFarOffHidesNothing) {
         EXPECT_LT(view.farPlane - view.nearPlane, 2.0) << "the codes of the depth are the object's";
 }
 
+TEST(Strays, OneSplatFarOffIsInNoView) {
+    // Behind the object, and so large that views show it beside the object.
+    Mesh mesh = sphereCloud(2000);
+    addPoint(mesh, {0, 6000, -10000});
+    auto cloud = std::make_shared<SplatCloud>();
+    ASSERT_TRUE(cloud->resize(mesh.positions.size(), 0, {}));
+    cloud->positions = mesh.positions;
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+        cloud->scales[i] = glm::vec3(i < 2000 ? 0.05f : 2000.0f);
+        cloud->rotations[i] = {0, 0, 0, 1};
+        cloud->opacities[i] = 1;
+    }
+    mesh.splats = cloud;
+    ViewLayout layout;
+    layout.count = 8;
+    ViewFraming framing;
+    framing.width = framing.height = 48;
+    const auto cameras = layoutCameras(layout, framing, drawnPoints(mesh));
+    ASSERT_TRUE(cameras);
+    Job job;
+    const auto bundle = captureBundle(mesh, *cameras, {}, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    ASSERT_EQ(bundle->views.size(), 8u);
+    for (const auto& view : bundle->views) EXPECT_LT(view.farPlane - view.nearPlane, 3.0);
+    EXPECT_EQ(cloud->opacities.back(), 1) << "the cloud itself stays as it is";
+    Job small;
+    small.limits.maxMemoryBytes = 2001 * SplatCloud::bytesEach(0) - 1;
+    const auto none = dropStrays(mesh, findStrays(mesh), small.limits);
+    ASSERT_FALSE(none);
+    EXPECT_EQ(none.error().code, ErrorCode::invalidInput);
+}
+
 TEST(Strays, ShapesHaveNone) {
     // A cube of 8 corners, a small thing on a wide floor, two clouds apart.
     Mesh cube;
@@ -134,7 +167,7 @@ TEST(Strays, AreSaidWithTheirPlace) {
     EXPECT_EQ(job.takeNotes(),
               std::vector<std::string>{"2 of 5002 points lie far outside of the rest (the farthest "
                                        "at 0 5000 7): bounds and reference views leave them out"});
-    dropStrays(mesh, strays);
+    ASSERT_TRUE(dropStrays(mesh, strays, {}));
     EXPECT_EQ(mesh.points.size(), 5000u);
 }
 

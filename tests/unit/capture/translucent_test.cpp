@@ -191,5 +191,25 @@ TEST(Translucent, TheNoteSaysSoOfTexturesAndVertexColours) {
     EXPECT_TRUE(notes[0].starts_with("material 'm0' is translucent")) << notes[0];
 }
 
+TEST(Translucent, TheNoteCountsMaterialsThatShareATexture) {
+    auto mesh = squares({{0, kRed}, {1, kRed}, {2, kRed}, {3, kRed}});
+    mesh.uvs.assign(mesh.positions.size(), glm::vec2(0.5f));
+    MeshTexture glass, holes;
+    glass.pixels = Rgba8Image(2, 2, {255, 255, 255, 128});
+    holes.pixels = Rgba8Image(2, 2, {255, 255, 255, 0});
+    mesh.textures = {holes, glass};
+    for (Material& m : mesh.materials) m.alpha = Material::Alpha::blend;
+    mesh.materials[0].baseColourTexture = 0;
+    mesh.materials[1].baseColourTexture = mesh.materials[2].baseColourTexture = 1;
+    // Of the last its colours tell; the first has none of them.
+    mesh.colours.assign(mesh.positions.size(), glm::vec4(1));
+    mesh.colours[13].a = 0.5f;
+    Job job;
+    ASSERT_TRUE(captureBundle(mesh, {above()}, {}, job));
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_TRUE(notes[0].starts_with("material 'm1' and 2 more are translucent")) << notes[0];
+}
+
 }  // namespace
 }  // namespace stx

@@ -35,6 +35,7 @@ TEST(PackPeriod, FramesShareRectanglesAndKeepWhatEachNeeds) {
         Bundle frame = frames[f];
         const auto report = period.prune(frame);
         EXPECT_EQ(report.sourcePixels, frames[f].pointCount());
+        EXPECT_EQ(report.sourcePoints, frames[f].pointCount());
         EXPECT_EQ(report.keptPixels, frame.pointCount());
         EXPECT_LT(report.keptPixels, report.sourcePixels * 9 / 10);
         for (std::size_t v = 0; v < frame.views.size(); ++v)
@@ -59,6 +60,31 @@ TEST(PackPeriod, FramesShareRectanglesAndKeepWhatEachNeeds) {
         const Camera camera = analytic::lookingAt({1, 2, 2}, 128);
         EXPECT_EQ(holes(draw(frames[f], camera), draw(*unpacked, camera)), 0);
     }
+}
+
+TEST(PackPeriod, AViewThatSeesNothingStays) {
+    Bundle frame = torusViews(64);
+    ReferenceView& blind = frame.views[2];
+    for (float& depth : blind.depth.pixels()) depth = kNoDepth;
+    for (glm::u8vec4& colour : blind.texture.rgba8()->pixels()) colour.a = 0;
+    Job job;
+    PackPeriod period;
+    ASSERT_TRUE(period.add(frame, frame));
+    const Bundle content = period.content();
+    PackSettings settings;
+    settings.layout = PackSettings::Layout::tight;
+    settings.contentOf = &content;
+    const auto atlas = pack(frame, settings, job);
+    ASSERT_TRUE(atlas) << atlas.error().text();
+    EXPECT_EQ(atlas->views.size(), frame.views.size());
+    EXPECT_TRUE(job.takeNotes().empty());
+    const auto unpacked = unpack(*atlas, job);
+    ASSERT_TRUE(unpacked) << unpacked.error().text();
+    ASSERT_EQ(unpacked->views.size(), frame.views.size());
+    for (std::size_t v = 0; v < frame.views.size(); ++v)
+        EXPECT_EQ(unpacked->views[v].depth, frame.views[v].depth);
+    const Camera camera = analytic::lookingAt({1, 2, 2}, 96);
+    EXPECT_EQ(holes(draw(frame, camera), draw(*unpacked, camera)), 0);
 }
 
 TEST(PackPeriod, OtherViewsAreRefused) {

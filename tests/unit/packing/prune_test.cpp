@@ -168,6 +168,37 @@ TEST(Prune, AHoleOfTheSensorDoesNotFillWhatIsAroundAMask) {
     }
 }
 
+TEST(Prune, WhatASensorMissedIsCountedBeside) {
+    // Two photographs that fill their frames; the sensor missed a part of the first.
+    Bundle bundle = torusViews();
+    bundle.views.resize(2);
+    for (ReferenceView& view : bundle.views) {
+        view.noDepth = NoDepth::unknown;
+        for (glm::u8vec4& c : view.texture.rgba8()->pixels()) c.a = 255;
+    }
+    const auto pixels = static_cast<std::int64_t>(2 * bundle.views[0].depth.count());
+    const auto points = bundle.pointCount();
+    Job job;
+    for (const bool measured : {false, true}) {
+        Bundle pruned = bundle;
+        const auto report =
+            measured ? pruneToQuality(pruned, {}, 120, job) : prune(pruned, {}, job);
+        ASSERT_TRUE(report) << report.error().text();
+        EXPECT_EQ(report->sourcePixels, pixels);
+        EXPECT_EQ(report->sourcePoints, points);
+        EXPECT_EQ(report->keptPixels, pruned.pointCount());
+        EXPECT_EQ(report->unmeasuredPixels, pixels - points);
+        PackSettings settings;
+        settings.layout = PackSettings::Layout::tight;
+        settings.sourcePixels = report->sourcePixels;
+        const auto atlas = pack(pruned, settings, job);
+        ASSERT_TRUE(atlas);
+        const auto unpacked = unpack(*atlas, job);
+        ASSERT_TRUE(unpacked);
+        EXPECT_EQ(unpacked->views[0].texture.at(0, 0).a, 1) << "unknown, not empty";
+    }
+}
+
 TEST(Prune, BudgetsAndQualitiesAreKept) {
     const Bundle before = torusViews();
     Job job;

@@ -6,6 +6,7 @@
 #include "lib/packing/packing.hpp"
 #include "lib/packing/patches.hpp"
 #include "lib/packing/rectangles.hpp"
+#include "lib/render/scene/page_set.hpp"
 
 namespace stx {
 namespace {
@@ -212,6 +213,40 @@ TEST(Tight, EmptyViewsAreDroppedAndSaid) {
     const auto back = unpack(*atlas, job);
     ASSERT_TRUE(back);
     EXPECT_EQ(back->views[0].depth, bundle.views[1].depth);
+}
+
+TEST(Tight, WhatOneViewMissesChangesNoOther) {
+    // A mesh's view beside a photograph whose sensor missed something, and shows what that has not.
+    Bundle bundle;
+    for (int i = 0; i < 2; ++i) {
+        bundle.views.push_back(blankView(64, 64));
+        bundle.views.back().name = fmt::format("v{}", i);
+    }
+    paint(bundle.views[0], 5, 5, 10, 10);
+    ReferenceView& photo = bundle.views[1];
+    photo.noDepth = NoDepth::unknown;
+    paint(photo, 40, 40, 10, 10);
+    for (glm::u8vec4& colour : photo.texture.rgba8()->pixels()) colour.a = 255;
+    PackSettings settings;
+    settings.layout = PackSettings::Layout::tight;
+    Job job;
+    const auto atlas = pack(bundle, settings, job);
+    ASSERT_TRUE(atlas);
+    ASSERT_LT(atlas->keptPixels, atlas->sourcePixels);
+    EXPECT_TRUE(outsideBits(*atlas, 0).empty());
+    EXPECT_FALSE(outsideBits(*atlas, 1).empty());
+    const auto back = unpack(*atlas, job);
+    ASSERT_TRUE(back);
+    const auto pages = PageSet::of(*atlas, job);
+    ASSERT_TRUE(pages);
+    for (int y = 0; y < 64; ++y) {
+        for (int x = 0; x < 64; ++x) {
+            const float alpha = bundle.views[0].texture.at(x, y).a;
+            ASSERT_EQ(back->views[0].texture.at(x, y).a, alpha) << x << ' ' << y;
+            ASSERT_EQ(pages->alpha(0, x, y), alpha) << x << ' ' << y;
+        }
+    }
+    EXPECT_EQ(back->views[1].texture.at(10, 30).a, 1);
 }
 
 TEST(Tight, PaddingShowsTheNeighboursInTheView) {

@@ -212,6 +212,27 @@ TEST(Sheet, OfAPairTellsTheSameAsCompare) {
     EXPECT_FALSE(sheetOf(onePair(a, Rgba8Image(150, 149)), {}, job));
 }
 
+TEST(Sheet, OfAPairShowsAnErrorThatIsFinerThanItsPictures) {
+    const Rgba8Image a(150, 150, {10, 200, 90, 255});
+    auto pairs = onePair(a, a);
+    ColourError& error = pairs[0].error.emplace();
+    error.found.psnrRgb = 91.25;
+    error.found.worst = {7, 9, 12345};
+    error.found.pixels = error.found.differentPixels = 150 * 150;
+    error.picture = Rgba8Image(150, 150, {255, 0, 0, 255});
+    Job job;
+    SheetSettings wide;
+    wide.mostSize = {4000, 2000};
+    const auto sheet = sheetOf(pairs, wide, job);
+    ASSERT_TRUE(sheet) << sheet.error().text();
+    EXPECT_TRUE(holdsText(sheet->picture, "PSNR 91.25 dB"));
+    EXPECT_TRUE(holdsText(sheet->picture, "worst 12345 at 7 9"));
+    EXPECT_FALSE(holdsText(sheet->picture, "identical"));
+    int red = 0;
+    for (const auto& c : sheet->picture.pixels()) red += c == glm::u8vec3(255, 0, 0);
+    EXPECT_EQ(red, 150 * 150);
+}
+
 TEST(Sheet, OfAPairShowsDepthThatOnlyOneHas) {
     auto pairs = onePair(Rgba8Image(150, 150), Rgba8Image(150, 150));
     pairs[0].depthA = Image<float>(150, 150, 2.0f);
