@@ -9,6 +9,7 @@
 #include "formats/any/sequences.hpp"
 #include "formats/files/file_spool.hpp"
 #include "formats/files/files.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/viewer/viewer_page.hpp"
@@ -55,7 +56,7 @@ Result<std::optional<ExtractAs>> extractedAs(const std::string& as,
         {".ply", {"points", "splats"}},   {".drc", {"points"}},       {".spz", {"splats"}},
         {".glb", {"surfaces", "splats"}}, {".png", {"pair", "rgbd"}}, {".jpg", {"pair", "rgbd"}},
         {".jpeg", {"pair", "rgbd"}}};
-    const std::string ending = file.extension().string();
+    const std::string ending = lowerExtension(file);
     const auto words = kEndings.find(ending);
     if (words == kEndings.end()) {
         if (as.empty()) return std::nullopt;

@@ -8,6 +8,7 @@
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/files/named_files.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/mapping/sequence_write.hpp"
@@ -23,7 +24,7 @@ constexpr double kUsualRate = 25;  ///< frames a second, where files do not tell
 
 bool isNumberedExr(const fs::path& path) {
     const auto one = frameName(path.string(), 0);
-    return one && fs::path(*one).extension() == ".exr";
+    return one && lowerExtension(*one) == ".exr";
 }
 
 /// One OpenEXR bundle, or one atlas, for each frame.
