@@ -65,16 +65,20 @@ bool namesEach(const std::string& pattern) {
            pattern.find("{parent}") != std::string::npos;
 }
 
+}  // namespace
+
 Json entryOf(const BatchItem& item, const char* status) {
     return {{"input", item.input}, {"output", item.output}, {"status", status}, {"exitCode", 0}};
 }
 
-Json failedEntry(const BatchItem& item, int exitCode, std::string message) {
+Json failedEntry(const BatchItem& item, const Error& error) {
     auto entry = entryOf(item, "error");
-    entry["exitCode"] = exitCode;
-    entry["message"] = std::move(message);
+    entry["exitCode"] = static_cast<int>(error.code);
+    entry["message"] = textOf(error);
     return entry;
 }
+
+namespace {
 
 /// Does one item in this process, whatever it throws.
 Json doItem(const BatchItem& item, const BatchWork& work, Program& program) {
@@ -88,7 +92,7 @@ Json doItem(const BatchItem& item, const BatchWork& work, Program& program) {
     }
     program.sayNotes();
     if (done) return *done;
-    return failedEntry(item, static_cast<int>(done.error().code), textOf(done.error()));
+    return failedEntry(item, done.error());
 }
 
 /// A worker's life: numbers of items come in, their reports go out.
@@ -238,11 +242,11 @@ void BatchRun::takeReport(Worker& worker) {
     worker.pid = -1;
     if (!worker.item || program_.job.cancelled) return;
     const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
-    auto entry = failedEntry(
-        items_[*worker.item], static_cast<int>(ErrorCode::failed),
+    const std::string message =
         signal == SIGKILL ? std::string("its process was killed, perhaps for lack of memory")
         : signal != 0     ? fmt::format("its process ended by signal {}", signal)
-                          : fmt::format("its process ended with {}", WEXITSTATUS(status)));
+                          : fmt::format("its process ended with {}", WEXITSTATUS(status));
+    auto entry = failedEntry(items_[*worker.item], {ErrorCode::failed, message, {}});
     entry["seconds"] = secondsSince(worker.since);
     finish(*std::exchange(worker.item, std::nullopt), std::move(entry));
 }
@@ -279,8 +283,7 @@ Result<void> BatchRun::giveItems() {
     const auto wanted = static_cast<std::size_t>(std::max(1, options_.jobs));
     while (mayStart()) {
         const auto& item = items_[next_];
-        std::error_code ec;
-        if (options_.skipExisting && fs::exists(item.output, ec)) {
+        if (options_.skipExisting && isThere(item.output)) {
             auto entry = entryOf(item, "skipped");
             entry["seconds"] = 0.0;
             finish(next_++, std::move(entry));
@@ -444,11 +447,10 @@ Result<int> runBatch(const std::vector<BatchItem>& items, const BatchOptions& op
                      const BatchWork& work, Program& program) {
     // What can be refused before any work is refused then; with --keep-going each input is on its
     // own.
-    std::error_code ec;
     std::optional<Error> refused;
     bool any = false;
     for (const auto& item : items) {
-        if (!options.keepGoing && !(options.skipExisting && fs::exists(item.output, ec)))
+        if (!options.keepGoing && !(options.skipExisting && isThere(item.output)))
             STX_CHECK(checkTarget(item.output, program));
         const auto made = item.output.empty() ? Result<void>() : program.makeFolderOf(item.output);
         any = any || made;
@@ -457,6 +459,47 @@ Result<int> runBatch(const std::vector<BatchItem>& items, const BatchOptions& op
     // What all of them would say is said once.
     if (!any && refused) return tl::unexpected(*refused);
     return BatchRun(items, options, work, program).run();
+}
+
+Result<int> runInTurn(const std::vector<BatchItem>& items, const BatchOptions& options,
+                      const BatchWork& work, Program& program) {
+    const bool goesOn = options.keepGoing && items.size() > 1;
+    auto entries = Json::array();
+    std::optional<Error> first;
+    std::size_t failed = 0, skipped = 0;
+    for (const BatchItem& item : items) {
+        if (first && (!goesOn || program.job.cancelled)) break;
+        auto entry = entryOf(item, "skipped");
+        if (options.skipExisting && isThere(item.output)) {
+            ++skipped;
+        } else if (auto done = work(item, program); done) {
+            entry = std::move(*done);
+        } else {
+            ++failed;
+            entry = failedEntry(item, done.error());
+            if (!first) first = done.error();
+            if (goesOn) {
+                program.sayNotes();
+                program.complain(
+                    fmt::format("error: {}: {}", inQuotes(item.output), textOf(done.error())));
+            }
+        }
+        if (options.shard.given) {
+            entry["index"] = item.index;
+            entry["shard"] = shardJson(options.shard, options.total);
+        }
+        entries.push_back(std::move(entry));
+    }
+    const std::size_t begun = entries.size();
+    const auto written = program.writeReport(
+        {{"$schema", "convert-report.schema.json"}, {"conversions", std::move(entries)}});
+    // The first error is the one to tell.
+    if (first && goesOn)
+        return fail(first->code, "{}: {} done, {} skipped, {} failed", counted(begun, "output"),
+                    begun - skipped - failed, skipped, failed);
+    if (first) return tl::unexpected(std::move(*first));
+    STX_CHECK(written);
+    return 0;
 }
 
 }  // namespace stx::tools

@@ -43,6 +43,11 @@ void addJobsOption(Command command, BatchOptions& options);
 [[nodiscard]] Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
                                                        const std::string& pattern);
 
+/// What a report says of an item that was done, or skipped ("skipped").
+[[nodiscard]] nlohmann::ordered_json entryOf(const BatchItem& item, const char* status);
+/// The same of one that failed.
+[[nodiscard]] nlohmann::ordered_json failedEntry(const BatchItem& item, const Error& error);
+
 /// Those items that the shard has; all when none was asked for.
 [[nodiscard]] std::vector<BatchItem> itemsOf(std::vector<BatchItem> items, const Shard& shard);
 
@@ -55,5 +60,12 @@ using BatchWork = std::function<Result<nlohmann::ordered_json>(const BatchItem&,
 /// error is that of the first input that failed, or the number of those that did (keepGoing).
 [[nodiscard]] Result<int> runBatch(const std::vector<BatchItem>& items, const BatchOptions& options,
                                    const BatchWork& work, Program& program);
+
+/// Does items in this process, one after the other, with one report of all that became of them
+/// (convert-report.schema.json). The error is that of the first that failed, or of several items
+/// under keepGoing the number of those that did.
+[[nodiscard]] Result<int> runInTurn(const std::vector<BatchItem>& items,
+                                    const BatchOptions& options, const BatchWork& work,
+                                    Program& program);
 
 }  // namespace stx::tools

@@ -31,6 +31,13 @@ int swayCount(const CameraOptions& o) {
 
 }  // namespace
 
+std::vector<MovedCamera> movedCameras(const std::vector<ReferenceView>& views) {
+    std::vector<MovedCamera> moved;
+    for (const ReferenceView& view : views)
+        if (!view.background) moved.push_back(MovedCamera::of(view));
+    return moved;
+}
+
 Camera inPicture(const Camera& camera, const std::optional<glm::ivec2>& size) {
     if (!size) return camera;
     const double scale = std::min(static_cast<double>(size->x) / camera.width,

@@ -61,6 +61,9 @@ struct CameraContext {
     std::optional<SwayPose> sway = {};  ///< where --sway is given
 };
 
+/// The cameras of views, without those of the background, and how they got where they are.
+[[nodiscard]] std::vector<MovedCamera> movedCameras(const std::vector<ReferenceView>& views);
+
 /// Notes that a cloud of splats is not taken to stand on +Y.
 void noteSplatsUp(glm::dvec3 up, Job& job);
 

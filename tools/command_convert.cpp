@@ -304,41 +304,21 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
                       "frames {} are asked for, but the set has {} (0 to {})", o.frames, count,
                       count - 1);
     (void)program.job.takeNotes();  // said again with each frame
-    auto entries = nlohmann::ordered_json::array();
-    const auto total = static_cast<std::size_t>(last - first) + 1;
-    const auto part = o.batch.shard.rangeOf(total);
-    for (std::size_t i = part.first; i < part.end; ++i) {
-        const int frame = static_cast<int>(first) + static_cast<int>(i);
+    BatchOptions batch = o.batch;
+    batch.total = static_cast<std::size_t>(last - first) + 1;
+    const auto part = batch.shard.rangeOf(batch.total);
+    std::vector<BatchItem> items;
+    const auto frameOf = [&](std::size_t index) {
+        return static_cast<int>(first) + static_cast<int>(index);
+    };
+    for (std::size_t i = part.first; i < part.end; ++i)
+        items.push_back({o.inputs[0], imagesets::filled(o.output, {"", 0, 0, frameOf(i)}), i});
+    const BatchWork work = [&](const BatchItem& item, Program& p) {
         ConvertOptions one = o;
-        one.open.set.frame = frame;
-        const auto target = imagesets::filled(o.output, {"", 0, 0, frame});
-        std::error_code ec;
-        nlohmann::ordered_json entry = {
-            {"input", o.inputs[0]}, {"output", target}, {"status", "skipped"}, {"exitCode", 0}};
-        if (!o.batch.skipExisting || !std::filesystem::exists(target, ec))
-            STX_SET(entry, convertOne(o.inputs[0], target, one, program));
-        if (o.batch.shard.given) {
-            entry["index"] = i;
-            entry["shard"] = shardJson(o.batch.shard, total);
-        }
-        entries.push_back(std::move(entry));
-    }
-    STX_CHECK(program.writeReport(
-        {{"$schema", "convert-report.schema.json"}, {"conversions", std::move(entries)}}));
-    return 0;
-}
-
-/// The report of one conversion that failed.
-Error withReport(const Error& error, const BatchItem& item, Program& program) {
-    const nlohmann::ordered_json entry = {{"input", item.input},
-                                          {"output", item.output},
-                                          {"status", "error"},
-                                          {"exitCode", static_cast<int>(error.code)},
-                                          {"message", textOf(error)}};
-    // The first error is the one to tell.
-    (void)program.writeReport({{"$schema", "convert-report.schema.json"},
-                               {"conversions", nlohmann::ordered_json::array({entry})}});
-    return error;
+        one.open.set.frame = frameOf(item.index);
+        return convertOne(item.input, item.output, one, p);
+    };
+    return runInTurn(items, batch, work, program);
 }
 
 Result<int> convert(const ConvertOptions& options, const Command& command, Program& program) {
@@ -382,22 +362,7 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
     const bool many = items.size() > 1 || o.inputs[0][0] == '@' || o.batch.shard.given;
     o.open.set.manyKinds = many;
     if (many) return runBatch(itemsOf(items, o.batch.shard), o.batch, work, program);
-
-    std::error_code ec;
-    nlohmann::ordered_json entry;
-    if (o.batch.skipExisting && std::filesystem::exists(items[0].output, ec)) {
-        entry = {{"input", items[0].input},
-                 {"output", items[0].output},
-                 {"status", "skipped"},
-                 {"exitCode", 0}};
-    } else {
-        auto done = work(items[0], program);
-        if (!done) return tl::unexpected(withReport(done.error(), items[0], program));
-        entry = std::move(*done);
-    }
-    STX_CHECK(program.writeReport({{"$schema", "convert-report.schema.json"},
-                                   {"conversions", nlohmann::ordered_json::array({entry})}}));
-    return 0;
+    return runInTurn(items, o.batch, work, program);
 }
 
 /// How pictures and scenes are coded.

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/any/sequences.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/meshes/meshes.hpp"
@@ -112,8 +113,8 @@ SurfacesOptions modelOf(const ExtractOptions& o) {
 
 /// What is written.
 struct Wanted {
-    std::optional<ExtractAs> as;   ///< nothing: a folder or a page
-    std::filesystem::path ending;  ///< of a file
+    std::optional<ExtractAs> as;  ///< nothing: a folder or a page
+    std::string ending;           ///< of a file, in small letters
     bool splats = false, points = false, picture = false;
     bool shown = false;  ///< a file that others show
 };
@@ -129,7 +130,7 @@ Result<Wanted> wantedOf(ExtractOptions& o) {
     const bool plain = o.output == given && !std::filesystem::is_directory(o.output, ec);
     Wanted w;
     STX_TRY(w.as, extractedAs(o.as, plain ? o.output : ""));
-    if (plain) w.ending = std::filesystem::path(o.output).extension();
+    if (plain) w.ending = lowerExtension(o.output);
     w.splats = w.as == ExtractAs::splats;
     w.points = w.as == ExtractAs::points;
     w.picture = w.as == ExtractAs::rgbd || w.as == ExtractAs::pair;

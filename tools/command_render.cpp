@@ -317,11 +317,6 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     STX_TRY(const auto around, environmentOf(o.environment, program.job));
     if (around) STX_SET(settings.environment, EnvironmentMap::make(*around, program.job.limits));
     STX_TRY(auto scene, openScene(o, settings, command, program));
-    std::size_t at = 0;
-    for (const std::string& light : o.lights) {
-        if (light == kEnvironmentLight) continue;
-        STX_TRY(settings.lighting.lights[at++], parseLight(light, scene.context.origin));
-    }
     if (lightsByEnvironment(o) && !scene.moving)
         STX_CHECK(lightBy(scene.model, settings, program.job));
     STX_TRY(const auto pictures, picturesOf(o, scene, program));

@@ -6,6 +6,7 @@
 #include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/files/file_spool.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/viewer/surfaces_glb.hpp"
 #include "formats/viewer/viewer_page.hpp"
 #include "lib/base/stopwatch.hpp"
@@ -141,7 +142,7 @@ Result<int> extractShown(const std::string& input, const OpenOptions& open,
     SurfacesOptions written = model;
     written.output = program.outputOptions();
     STX_TRY(const Shown done,
-            std::filesystem::path(output).extension() == ".glb"
+            lowerExtension(output) == ".glb"
                 ? writeModel(input, open, output, time, refine, written, program)
                 : writePage(input, open, output, refine, model.jpegQuality, program));
     return finish(input, output, done, watch.seconds(), program);

@@ -9,6 +9,7 @@
 #include "formats/any/sequences.hpp"
 #include "formats/files/file_spool.hpp"
 #include "formats/files/files.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/viewer/viewer_page.hpp"
@@ -55,7 +56,7 @@ Result<std::optional<ExtractAs>> extractedAs(const std::string& as,
         {".ply", {"points", "splats"}},   {".drc", {"points"}},       {".spz", {"splats"}},
         {".glb", {"surfaces", "splats"}}, {".png", {"pair", "rgbd"}}, {".jpg", {"pair", "rgbd"}},
         {".jpeg", {"pair", "rgbd"}}};
-    const std::string ending = file.extension().string();
+    const std::string ending = lowerExtension(file);
     const auto words = kEndings.find(ending);
     if (words == kEndings.end()) {
         if (as.empty()) return std::nullopt;
@@ -95,9 +96,10 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
     std::size_t views = 0, splats = 0;
     ViewTally tally;
     std::atomic<bool> translucent = false;
-    std::uint64_t bytes = 0;
     glm::vec3 up(0, 1, 0);
-    for (std::size_t i = first; i < end; ++i) {
+    std::vector<std::string> targets;
+    OutputFiles files;
+    const auto add = [&](std::size_t i) -> Result<void> {
         STX_TRY(auto table, frames->views(i, program.job));
         if (i == first) {
             views = table->count();
@@ -113,12 +115,20 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
             up = cloud.up;
         }
         cloud.up = up;  // whatever the cameras of later frames do: a film is turned as one
-        const std::string target = frameName(output, static_cast<int>(i - first)).value_or(output);
-        STX_CHECK(writeSplats(target, std::move(cloud), program.outputOptions(), program.job));
-        bytes += bytesOf(target);
+        targets.push_back(frameName(output, static_cast<int>(i - first)).value_or(output));
+        return writeSplats(targets.back(), std::move(cloud), {program.common.noClobber, &files},
+                           program.job);
+    };
+    for (std::size_t i = first; i < end; ++i) {
+        if (auto added = add(i); !added)
+            return tl::unexpected(end - first > 1 ? added.error().at(timeline.nameOf(i))
+                                                  : added.error());
         program.job.progress(static_cast<std::int64_t>(i - first) + 1,
                              static_cast<std::int64_t>(end - first), "writing splats");
     }
+    STX_CHECK(files.commit());
+    std::uint64_t bytes = 0;
+    for (const std::string& target : targets) bytes += bytesOf(target);
     if (translucent)
         program.job.note("translucent surfaces are opaque or nearly so as splats, which overlap");
     const double seconds = watch.seconds();

@@ -19,9 +19,9 @@ enum class ExtractAs { points, splats, surfaces, rgbd, pair };
 [[nodiscard]] Result<std::optional<ExtractAs>> extractedAs(const std::string& as,
                                                            const std::filesystem::path& file);
 
-/// `stx extract` into a file of splats, or of a film into one for each frame where `output` has a
-/// number (%04d): says what was written and reports it. Errors: those of momentOf(), of the input,
-/// splatsOfViews() and writeSplats().
+/// `stx extract` into a file of splats, or of a film into one for each frame, all or none, where
+/// `output` has a number (%04d): says what was written and reports it. Errors: those of momentOf(),
+/// of the input, splatsOfViews() and writeSplats().
 [[nodiscard]] Result<int> extractSplats(const std::string& input, const OpenOptions& open,
                                         const std::string& output,
                                         const std::optional<double>& time,

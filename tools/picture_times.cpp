@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "lib/render/factory.hpp"
+#include "tools/camera_options.hpp"
 #include "tools/drawn_views.hpp"
 #include "tools/environment_options.hpp"
 #include "tools/program.hpp"
@@ -184,6 +185,7 @@ Result<Renderer*> MovingPictures::at(double time, std::optional<double> next) {
         frame_ = frame;
         views_.clear();
         for (const ReferenceView& view : bundle.views) views_.push_back(view.camera);
+        moved_ = movedCameras(bundle.views);
         points_ = bundle.pointCount();
         bounds_ = bundle.bounds ? *bundle.bounds : bundle.computeBounds();
         origin_ = bundle.origin;

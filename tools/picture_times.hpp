@@ -11,6 +11,7 @@
 #include "formats/files/file_spool.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/model/sequence.hpp"
+#include "lib/registration/camera_moves.hpp"
 
 namespace stx::tools {
 
@@ -52,6 +53,8 @@ class MovingPictures {
     [[nodiscard]] const Timeline& timeline() const { return frames_->timeline(); }
     /// The cameras of the reference views of the frame whose renderer is here.
     [[nodiscard]] const std::vector<Camera>& views() const { return views_; }
+    /// The same as movedCameras().
+    [[nodiscard]] const std::vector<MovedCamera>& moved() const { return moved_; }
     [[nodiscard]] std::int64_t points() const { return points_; }
     [[nodiscard]] const Bounds& bounds() const { return bounds_; }
     [[nodiscard]] glm::dvec3 origin() const { return origin_; }
@@ -89,6 +92,7 @@ class MovingPictures {
     std::optional<FrameViews> spooled_;
     std::unique_ptr<Renderer> renderer_;
     std::vector<Camera> views_;
+    std::vector<MovedCamera> moved_;
     std::shared_ptr<const Environment> own_;  ///< of the frames
     std::shared_ptr<const EnvironmentMap> ownMap_;
     std::shared_ptr<const EnvironmentLight> ownLight_;

@@ -412,6 +412,12 @@ std::uint64_t bytesOf(const std::filesystem::path& path) {
     return sum;
 }
 
+bool isThere(const std::string& output) {
+    std::error_code ec;
+    if (std::filesystem::exists(output, ec)) return true;
+    return frameName(output, 0) && numberedFiles(output).has_value();
+}
+
 Result<std::string> folderTarget(const std::string& target, const std::vector<std::string>& files,
                                  std::string_view expected) {
     if (target == "-")

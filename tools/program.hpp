@@ -112,6 +112,8 @@ class Program {
 [[nodiscard]] std::string nearestWord(std::string_view word, const std::vector<std::string>& words);
 /// Size of a file, or of all files in a folder.
 [[nodiscard]] std::uint64_t bytesOf(const std::filesystem::path& path);
+/// Whether an output is there: a file or a folder, or one of the files of a numbered name.
+[[nodiscard]] bool isThere(const std::string& output);
 /// A target that may be a folder, without slashes at its end. Error (usage) when it ends like a
 /// file, neither exists as a folder nor has a slash, and is none of `files` (".ply"); `expected` is
 /// for the message.

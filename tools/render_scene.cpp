@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <type_traits>
+#include <utility>
 
 #include "formats/any/open.hpp"
 #include "formats/any/sequences.hpp"
@@ -15,6 +16,7 @@
 #include "lib/refine/refine_needed.hpp"
 #include "lib/render/factory.hpp"
 #include "tools/drawn_views.hpp"
+#include "tools/light_options.hpp"
 #include "tools/refining.hpp"
 
 namespace stx::tools {
@@ -175,39 +177,63 @@ Result<void> checkPictures(const RenderOptions& o, const RenderSettings& asked,
     return checkDrawing(*scene.table, drawingMemory(settings), wanted, limits);
 }
 
-Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& settings,
-                             const Command& command, Program& program) {
+namespace {
+
+/// Lights that are in the world, from an origin.
+Result<void> placeLights(const RenderOptions& o, glm::dvec3 origin, RenderSettings& settings) {
+    std::size_t at = 0;
+    for (const std::string& light : o.lights) {
+        if (light == kEnvironmentLight) continue;
+        STX_TRY(settings.lighting.lights[at++], parseLight(light, origin));
+    }
+    return {};
+}
+
+/// What moves, and what is asked for as if it did.
+Result<DrawnScene> openMoving(const RenderOptions& o, RenderSettings& settings,
+                              const Command& command, Program& program) {
     DrawnScene scene;
-    const bool sways = o.camera.swayPercent > 0;
+    STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
+    if (!frames->timeline().moves())
+        program.job.noteUnused(command.given({"--time", "--times"}), "of films",
+                               fmt::format("'{}' does not move", o.input));
+    if (o.camera.swayPercent > 0) STX_SET(scene.context.sway, swayPose(o, *frames, program.job));
+    STX_TRY(const auto times, timesOf(o.time, frames->timeline()));
+    if (!settings.lighting.lights.empty()) {
+        // All frames count from one origin, and each is drawn with the lights as they are here.
+        Job quiet;  // the frame is read again when it is drawn, and says the same then
+        quiet.workFor(program.job);
+        STX_TRY(const auto first, frames->views(frames->timeline().frameAt(times.front()), quiet));
+        STX_CHECK(placeLights(o, std::as_const(*first).about().origin, settings));
+    }
+    scene.moving = std::make_unique<MovingPictures>(std::move(frames), settings, o.backend,
+                                                    o.device, folderBeside(o.output), program.job);
+    if (lightsByEnvironment(o)) scene.moving->lightByEnvironment();
+    STX_CHECK(scene.moving->at(times.front(), {}));
+    scene.context.views = scene.moving->views();
+    scene.context.moved = MovesOfNeighbours(scene.moving->moved());
+    scene.context.bounds = scene.moving->bounds();
+    scene.context.origin = scene.moving->origin();
+    scene.environment = settings.environment || scene.moving->environment();
+    noteUnused(Bundle(), o, command, program);
+    return scene;
+}
+
+}  // namespace
+
+Result<DrawnScene> openScene(const RenderOptions& o, RenderSettings& settings,
+                             const Command& command, Program& program) {
     // A mesh is not a sequence; whatever else does not move is one of a single frame.
     const auto kind = recognise(o.input);
     const bool ofMesh = o.open.set.from.empty() && kind && *kind == FileKind::mesh;
-    if (o.time.any() && !ofMesh) {
-        STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
-        if (!frames->timeline().moves())
-            program.job.noteUnused(command.given({"--time", "--times"}), "of films",
-                                   fmt::format("'{}' does not move", o.input));
-        if (sways) STX_SET(scene.context.sway, swayPose(o, *frames, program.job));
-        scene.moving = std::make_unique<MovingPictures>(
-            std::move(frames), settings, o.backend, o.device, folderBeside(o.output), program.job);
-        if (lightsByEnvironment(o)) scene.moving->lightByEnvironment();
-        STX_TRY(const auto times, timesOf(o.time, scene.moving->timeline()));
-        STX_CHECK(scene.moving->at(times.front(), {}));
-        scene.context.views = scene.moving->views();
-        scene.context.bounds = scene.moving->bounds();
-        scene.context.origin = scene.moving->origin();
-        scene.environment = settings.environment || scene.moving->environment();
-        noteUnused(Bundle(), o, command, program);
-        return scene;
-    }
+    if (o.time.any() && !ofMesh) return openMoving(o, settings, command, program);
+    DrawnScene scene;
+    const bool sways = o.camera.swayPercent > 0;
     STX_CHECK(openStill(o, settings, scene, program.job));
     noteUnused(scene.model, o, command, program);
     const auto addViews = [&](const auto& seen) -> Result<void> {
         for (const auto& v : seen.views) scene.context.views.push_back(v.camera);
-        std::vector<MovedCamera> moved;
-        for (const auto& v : seen.views)
-            if (!v.background) moved.push_back(MovedCamera::of(v));
-        scene.context.moved = MovesOfNeighbours(std::move(moved));
+        scene.context.moved = MovesOfNeighbours(movedCameras(seen.views));
         scene.points = scene.table ? pointsOf(scene.summaries) : seen.pointCount();
         scene.environment = settings.ownEnvironment && seen.environment;
         if (sways) STX_SET(scene.context.sway, swayPose(o.camera, seen));
@@ -232,6 +258,7 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
     scene.environment = scene.environment || settings.environment;
     scene.context.bounds = boundsOf(scene.model);
     scene.context.origin = originOf(scene.model);
+    STX_CHECK(placeLights(o, scene.context.origin, settings));
     return scene;
 }
 

@@ -62,7 +62,8 @@ struct DrawnScene {
 };
 
 /// Opens the input: as a sequence when times are asked for. Notes options that do not matter to it.
-[[nodiscard]] Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& settings,
+/// Puts the lights of `settings` to where they are from the input's origin.
+[[nodiscard]] Result<DrawnScene> openScene(const RenderOptions& o, RenderSettings& settings,
                                            const Command& command, Program& program);
 
 /// Errors: Camera::check(); (usage) a film of two sizes; (invalidInput) a picture takes more than

@@ -9,6 +9,7 @@
 #include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/imagesets/set_views.hpp"
 #include "formats/imagesets/summary.hpp"
@@ -303,7 +304,7 @@ Result<void> describeAtlas(const fs::path& path, const std::string& object, Json
         out["object"] = object;
     }
     out["container"] =
-        fs::is_regular_file(path) && path.extension() == ".exr" ? "atlas-exr" : "atlas";
+        fs::is_regular_file(path) && lowerExtension(path) == ".exr" ? "atlas-exr" : "atlas";
     bool second = false;
     auto textures = Json::array();
     for (const auto& t : header.textures) {

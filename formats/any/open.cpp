@@ -5,6 +5,7 @@
 
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/files/not_there.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/imagesets/image_sets.hpp"
@@ -18,13 +19,6 @@ namespace stx {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string lowerExtension(const fs::path& path) {
-    std::string e = path.extension().string();
-    std::transform(e.begin(), e.end(), e.begin(),
-                   [](unsigned char c) { return c < 128 ? std::tolower(c) : c; });
-    return e;
-}
 
 /// The first bytes of a file; empty when it cannot be read.
 Bytes headOf(const fs::path& path) {
@@ -51,8 +45,9 @@ Result<bool> namesFilm(const fs::path& path) {
     if (!frameName(path.string(), 0)) return false;
     STX_CHECK(checkPattern(path.string()));
     auto files = numberedFiles(path.string());
-    if (path.extension() == ".exr" && !files) return propagate(files);
-    return files && (path.extension() == ".exr" || isAtlasFolder(files->front().path));
+    const bool exr = lowerExtension(path) == ".exr";
+    if (exr && !files) return propagate(files);
+    return files && (exr || isAtlasFolder(files->front().path));
 }
 
 Error isMeshError(const fs::path& path) {

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "lib/render/factory.hpp"
@@ -44,9 +45,7 @@ Result<Summarise> summariesFor(const ViewTable& table, SaveOptions::Summaries wa
 }  // namespace
 
 Result<FileKind> containerOf(const fs::path& target) {
-    std::string ending = target.extension().string();
-    std::transform(ending.begin(), ending.end(), ending.begin(),
-                   [](unsigned char c) { return c < 128 ? std::tolower(c) : c; });
+    const std::string ending = lowerExtension(target);
     if (ending == ".exr") return FileKind::exr;
     if (mpeg4ContainerOf(target)) return FileKind::mpeg4;
     return fail(ErrorCode::usage,

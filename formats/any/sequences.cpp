@@ -8,6 +8,7 @@
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/files/named_files.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/mapping/sequence_write.hpp"
@@ -23,7 +24,7 @@ constexpr double kUsualRate = 25;  ///< frames a second, where files do not tell
 
 bool isNumberedExr(const fs::path& path) {
     const auto one = frameName(path.string(), 0);
-    return one && fs::path(*one).extension() == ".exr";
+    return one && lowerExtension(*one) == ".exr";
 }
 
 /// One OpenEXR bundle, or one atlas, for each frame.
@@ -102,20 +103,44 @@ struct Shown {
     glm::dvec3 origin{0.0};
     bool noPoints = false;
 };
-Result<Shown> shownOf(const fs::path& path, bool atlas, const std::string& object,
-                      const Limits& limits) {
-    if (!atlas) {
+/// What the header of a file says.
+struct FrameHeader {
+    Shown shown;
+    bool atlas = false;
+    Bundle about;  ///< its views and its time
+};
+Result<FrameHeader> headerOf(const fs::path& path, const std::string& object,
+                             const Limits& limits) {
+    FrameHeader out;
+    STX_TRY(const auto kind, recognise(path));
+    out.atlas = kind == FileKind::atlas;
+    if (!out.atlas) {
         STX_TRY(const auto header, readExrBundleHeader(path, limits));
         const bool noPoints = std::ranges::all_of(
             header.views, [](const ExrViewHeader& view) { return view.points == 0; });
-        return Shown{header.time, header.duration, header.bounds, header.origin, noPoints};
+        out.shown = {header.time, header.duration, header.bounds, header.origin, noPoints};
+        for (const ExrViewHeader& view : header.views) out.about.views.push_back(view.view);
+    } else {
+        STX_TRY(auto header, readAtlasHeader(path, limits));
+        // Which of several it is shows when a frame is asked for.
+        if (auto kept = keepObject(header.atlas, object); !kept && !object.empty())
+            return tl::unexpected(kept.error().at(fmt::format("'{}'", path.string())));
+        out.shown = {header.atlas.time, header.atlas.duration, header.atlas.bounds,
+                     header.atlas.origin};
+        out.about.views = std::move(header.atlas.views);
     }
-    STX_TRY(auto header, readAtlasHeader(path, limits));
-    // Which of several it is shows when a frame is asked for.
-    if (auto kept = keepObject(header.atlas, object); !kept && !object.empty())
-        return tl::unexpected(kept.error().at(fmt::format("'{}'", path.string())));
-    return Shown{header.atlas.time, header.atlas.duration, header.atlas.bounds,
-                 header.atlas.origin};
+    out.about.time = out.shown.time;
+    return out;
+}
+
+/// Errors (invalidInput): a file that has other views than the first. It is not damaged, so that
+/// the frame before it must not be shown for it.
+Result<void> checkViewsOf(const fs::path& path, const Bundle& first, const Bundle& frame) {
+    auto same = checkSameViews(first, frame);
+    if (same) return {};
+    Error other = same.error().at(fmt::format("'{}'", path.string()));
+    other.message += "; the files of a film have the same views: give other ones other names";
+    return tl::unexpected(std::move(other));
 }
 
 /// All together, from the first one's origin; none where a header does not tell.
@@ -133,6 +158,11 @@ std::optional<FilmBounds> boundsOf(const std::vector<Shown>& shown) {
     return film;
 }
 
+/// When the frame of a file is shown that does not tell it.
+double usualTime(const NumberedFile& file, const NumberedFile& first) {
+    return static_cast<double>(file.number - first.number) / kUsualRate;
+}
+
 /// The files that tell when they are shown. The others are left out with a note, so that those
 /// before are shown on; they are errors when `strict`, or when none is left.
 struct UsableFiles {
@@ -143,6 +173,7 @@ struct UsableFiles {
 Result<UsableFiles> usableFiles(std::vector<NumberedFile> files, const fs::path& pattern,
                                 const std::string& object, bool strict, Job& job) {
     UsableFiles film;
+    Bundle views;  // of the first
     std::optional<Error> first;
     const auto all = files.size();
     if (const auto gap = firstMissing(files)) {
@@ -159,19 +190,21 @@ Result<UsableFiles> usableFiles(std::vector<NumberedFile> files, const fs::path&
     }
     for (NumberedFile& file : files) {
         STX_CHECK(job.checkCancelled());
-        const auto add = [&]() -> Result<void> {
-            STX_TRY(const auto kind, recognise(file.path));
-            STX_TRY(const auto shown,
-                    shownOf(file.path, kind == FileKind::atlas, object, job.limits));
-            if (film.files.empty()) film.atlases = kind == FileKind::atlas;
-            film.shown.push_back(shown);
-            film.files.push_back(std::move(file));
-            return {};
-        };
-        if (auto added = add(); !added) {
-            if (strict || !isDamage(added.error())) return propagate(added);
-            if (!first) first = added.error();
+        auto header = headerOf(file.path, object, job.limits);
+        if (!header) {
+            if (strict || !isDamage(header.error())) return propagate(header);
+            if (!first) first = header.error();
+            continue;
         }
+        if (film.files.empty()) {
+            film.atlases = header->atlas;
+            views = std::move(header->about);
+        } else {
+            if (!header->about.time) header->about.time = usualTime(file, film.files.front());
+            STX_CHECK(checkViewsOf(file.path, views, header->about));
+        }
+        film.shown.push_back(header->shown);
+        film.files.push_back(std::move(file));
     }
     if (film.files.empty()) return tl::unexpected(*first);
     if (first)
@@ -192,8 +225,7 @@ Result<Timeline> timelineOf(const UsableFiles& film, const fs::path& pattern, Jo
     const bool told = std::ranges::all_of(film.shown, [](const Shown& s) { return !!s.time; });
     for (std::size_t i = 0; i < files.size(); ++i) {
         if (!told) {
-            line.times.push_back(static_cast<double>(files[i].number - files.front().number) /
-                                 kUsualRate);
+            line.times.push_back(usualTime(files[i], files.front()));
             continue;
         }
         const double time = *film.shown[i].time;

@@ -90,6 +90,8 @@ class Viewer {
     }
 
     play(on) {
+        // What an older run still waits for ends it.
+        const run = this.run = {};
         this.playing = on && this.data.frames.length > 1;
         const button = document.getElementById("play");
         button.textContent = this.playing ? "Stop" : "Play";
@@ -98,7 +100,7 @@ class Viewer {
         const first = this.data.times[0], length = this.data.end - first;
         const begun = performance.now() - (this.data.times[this.frame] - first) * 1000;
         const step = async () => {
-            if (!this.playing) return;
+            if (this.run !== run) return;
             const wanted = this.frameAt(first + (performance.now() - begun) / 1000 % length);
             if (wanted !== this.frame) await this.showFrame(wanted);
             requestAnimationFrame(step);
@@ -200,7 +202,6 @@ class Viewer {
 
     // Draws soon; what moves is drawn once more, in full, when it stands still.
     redraw(moving) {
-        if (this.shown.length === 0) return;
         this.quick = Boolean(moving);
         if (!this.waiting) {
             this.waiting = requestAnimationFrame(() => {
@@ -450,7 +451,9 @@ class Viewer {
         const view = this.shown.flatMap((scene) => scene.views).find((v) => v.name === first.name) || first;
         const axes = axesOf(view.orientation);
         const ahead = times(axes[2], -1), c = this.camera;
-        const reach = Math.max(1e-9, dot(minus(this.data.start.centre, view.position), ahead)) || this.data.start.radius;
+        // Beside or behind it the middle tells no distance: it is as far as at the start, startOf().
+        const {centre, radius} = this.data.start, along = dot(minus(centre, view.position), ahead);
+        const reach = along > 1e-9 * radius ? along : radius;
         Object.assign(c, {eye: view.position.slice(), target: plus(view.position, times(ahead, reach)), up: axes[1]});
         if (!view.orthographic) c.fov = 2 * Math.atan(0.5 * view.height / view.fy) * 180 / Math.PI;
         this.redraw();

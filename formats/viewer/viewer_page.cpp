@@ -50,7 +50,7 @@ Result<PageWriter> startPage(const std::filesystem::path& path, const PageOption
     return writer;
 }
 
-/// What a page says of the points of its first frame.
+/// What a page says of the points of the first frame that has any.
 struct PagePoints {
     std::int64_t count = 0;
     Bounds bounds;
@@ -248,7 +248,7 @@ class PageViews {
     PageGroups groups_;
 };
 
-/// Adds what views of the first frame say.
+/// Adds what views say that have points.
 void look(const Bundle& views, PagePoints& points) {
     points.count += views.pointCount();
     if (!points.boundsKnown)
@@ -321,9 +321,10 @@ Result<std::optional<int>> writeBehind(PageWriter& writer, std::unique_ptr<ViewT
     return writeUnmeasured(writer, std::as_const(*table).about(), options, job);
 }
 
-/// Writes one scene of a frame and gives its number. `points`, if any, is added to.
-Result<int> writeScene(PageWriter& writer, std::size_t slot, PageViews& views,
-                       const PageOptions& options, PagePoints* points, Job& job) {
+/// Writes one scene of a frame and gives its number; nothing where it has no point. `points`, if
+/// any, is added to.
+Result<std::optional<int>> writeScene(PageWriter& writer, std::size_t slot, PageViews& views,
+                                      const PageOptions& options, PagePoints* points, Job& job) {
     PageScene scene(options.colours);
     Json pages = Json::array();
     const auto& groups = views.groups()[slot];
@@ -332,16 +333,17 @@ Result<int> writeScene(PageWriter& writer, std::size_t slot, PageViews& views,
         STX_TRY(Bundle bundle, views.take(groups[k], job));
         makeViewable(bundle, job);
         if (options.colours.copies) keepExactFiles(bundle, job.limits);
+        // What has no content has no texture.
+        if (bundle.pointCount() == 0) continue;
         if (points) look(bundle, *points);
-        // A view without content has no texture.
-        if (groups.size() > 1 && bundle.pointCount() == 0) continue;
         STX_TRY(const Atlas atlas, packForPage(bundle, job));
         bundle.views.clear();
         STX_TRY(auto images, scene.add(atlas, job));
         STX_CHECK(writer.addImages(slot, k, std::move(images), pages));
     }
-    if (pages.empty()) return fail(ErrorCode::invalidInput, "none of the views has a point");
-    return writer.addScene(slot, scene.description(std::move(pages)));
+    if (pages.empty()) return std::nullopt;
+    STX_TRY(const int number, writer.addScene(slot, scene.description(std::move(pages))));
+    return number;
 }
 
 PageReport reportOf(const PageWriter& writer, std::size_t views, std::int64_t points,
@@ -381,7 +383,7 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
     std::optional<PageWriter> writer;
     Json scenes = Json::array(), data;
     PagePoints points;
-    Bundle about;  // of the first frame, without images
+    Bundle about;  // of the same frame, without images
     LeftOut leftOut;
     for (std::size_t i = 0; i < line.count(); ++i) {
         job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(line.count()),
@@ -396,24 +398,26 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
             STX_SET(writer,
                     startPage(path, options, std::as_const(*table).about().title, line.moves()));
         STX_TRY(const auto behind, writeBehind(*writer, table, options, leftOut, job));
-        if (i == 0) about = headersOf(std::as_const(*table).about());
+        const bool tells = data.is_null();  // no frame before has a point
+        if (tells) about = headersOf(std::as_const(*table).about());
         STX_CHECK(leaveCoarseOut(table, leftOut, job));
         STX_TRY(auto views, PageViews::of(std::move(table), line.moves(), job));
-        if (i == 0) {
+        if (tells) {
             points.boundsKnown = about.bounds.has_value();
             if (points.boundsKnown) points.bounds = *about.bounds;
         }
         Json numbers = Json::array();
         for (std::size_t slot = 0; slot < views.groups().size(); ++slot) {
-            STX_TRY(const int number,
-                    writeScene(*writer, slot, views, options, i == 0 ? &points : nullptr, job));
-            numbers.push_back(number);
+            STX_TRY(const auto number,
+                    writeScene(*writer, slot, views, options, tells ? &points : nullptr, job));
+            if (number) numbers.push_back(*number);
         }
         if (behind) numbers.push_back(*behind);
         scenes.push_back(std::move(numbers));
-        if (i > 0) continue;
-        STX_TRY(data, dataOf(about.views, points, about.origin, line, options));
+        if (tells && points.count > 0)
+            STX_SET(data, dataOf(about.views, points, about.origin, line, options));
     }
+    if (data.is_null()) return fail(ErrorCode::invalidInput, "none of the views has a point");
     data["frames"] = std::move(scenes);
     if (!leftOut.empty()) data["without"] = fmt::format("{}", fmt::join(leftOut, ","));
     STX_CHECK(writer->finish(data));

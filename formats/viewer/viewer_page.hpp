@@ -29,7 +29,7 @@ struct PageOptions {
 /// What a page holds.
 struct PageReport {
     std::size_t views = 0;
-    std::int64_t points = 0;  ///< of the first frame
+    std::int64_t points = 0;  ///< of the first frame that has any
     std::size_t frames = 0;
     std::uint64_t imageBytes = 0;  ///< of its PNG and JPEG files
     std::uint64_t bytes = 0;       ///< of the page
@@ -50,9 +50,11 @@ void noteEnvironmentLeftOut(const std::shared_ptr<const Environment>& environmen
 /// and many small ones take longer to draw. The page is UTF-16, takes 1.03 bytes for each of the
 /// images (pageText()) and about 30 kB.
 ///
+/// A frame of a film without points shows the background alone.
+///
 /// Notes: colours of linear light become 8-bit sRGB, depth of 32 bits becomes 16; what no sensor
 /// measured is left out for want of memory; a page that browsers find hard to hold. Errors: those
-/// of the sequence and of pack(); files; cancelled.
+/// of the sequence and of pack(); (invalidInput) no frame has a point; files; cancelled.
 [[nodiscard]] Result<PageReport> writeViewerPage(Sequence& frames,
                                                  const std::filesystem::path& path,
                                                  const PageOptions& options, Job& job);

@@ -6,6 +6,8 @@
 #include <map>
 #include <set>
 
+#include "lib/base/counted.hpp"
+
 namespace stx {
 namespace {
 
@@ -389,8 +391,8 @@ std::unique_ptr<Sequence> acrossDamage(std::unique_ptr<Sequence> frames) {
 Result<void> checkSameViews(const Bundle& first, const Bundle& frame) {
     const double time = frame.time.value_or(0);
     if (frame.views.size() != first.views.size())
-        return fail(ErrorCode::invalidInput, "there are {} views at {:g} s, but {} at the start",
-                    frame.views.size(), time, first.views.size());
+        return fail(ErrorCode::invalidInput, "{} at {:g} s, but {} at the start",
+                    counted(frame.views.size(), "view"), time, first.views.size());
     for (std::size_t i = 0; i < first.views.size(); ++i) {
         const ReferenceView& was = first.views[i];
         const ReferenceView& is = frame.views[i];

@@ -50,6 +50,63 @@ def node_run(node, folder, scripts, code, *args):
     return done.stdout.split(), done.stderr[-300:]
 
 
+# A viewer without a page, and a clock and pictures that come when they are asked for.
+VIEWER = """
+    let clock = 0, loaded;
+    const waiting = [], elements = {};
+    Object.defineProperty(globalThis, "performance", {value: {now: () => clock}});
+    globalThis.requestAnimationFrame = (act) => waiting.push(act);
+    document.getElementById = (id) => elements[id] = elements[id] || {setAttribute() {}};
+    const turn = () => new Promise((done) => setImmediate(done));
+    const next = async () => { for (const act of waiting.splice(0)) act(clock); await turn(); };
+    const viewer = Object.create(Viewer.prototype);
+    Object.assign(viewer, {writeAddress() {}, frame: 0, shown: [], data: {
+        frames: Array(100).fill([0]), times: [...Array(100).keys()].map((i) => i / 10), end: 10, slack: 1e-6}});
+"""
+
+
+def viewer_failures(node, folder):
+    """How many of what viewer.js does by itself is wrong."""
+    with tempfile.TemporaryDirectory() as top:
+        for name in ("camera.js", "viewer.js"):
+            with open(os.path.join(folder, name), encoding="utf-8") as file, open(os.path.join(top, name), "w", encoding="utf-8") as out:
+                out.write(file.read().split("// The panel comes packed")[0])
+        failed = 0
+        for what, code, wanted in (
+                # While a picture is loaded the film is stopped, and begun again.
+                ("a run that waits ends when the film is stopped", """
+                 viewer.showFrame = (frame) => (viewer.frame = frame, new Promise((done) => loaded = done));
+                 (async () => {
+                     viewer.play(true);
+                     clock = 500;
+                     await next();
+                     viewer.play(false);
+                     viewer.play(true);
+                     loaded();
+                     await turn();
+                     await next();
+                     console.log(viewer.frame, waiting.length);
+                 })();""", ["5", "1"]),
+                ("a frame without scenes is drawn", """
+                 Object.assign(viewer, {painter: {gl: {isContextLost: () => false}}});
+                 viewer.data.frames = [[]];
+                 viewer.showFrame(0).then(() => console.log(viewer.shown.length, waiting.length));""", ["0", "1"]),
+                # Of views that look away from the middle, along the axes, and at it.
+                ("a view that looks away from the middle has a target as far as the object is large", """
+                 Object.assign(viewer, {redraw() {}, camera: {}});
+                 viewer.data.start = {centre: [0, 0, 5], radius: 2};
+                 for (const position of [[0, 0, 0], [0, 0, 5], [0, 0, 9]]) {
+                     viewer.data.cameras = [{name: "a", position, orientation: [1, 0, 0, 0], width: 8, height: 8, fy: 4}];
+                     viewer.fromView("0");
+                     console.log(lengthOf(minus(viewer.camera.target, viewer.camera.eye)));
+                 }""", ["2", "2", "4"])):
+            found, said = node_run(node, top, ("camera.js", "viewer.js"), VIEWER + code)
+            if found != wanted:
+                failed += 1
+                print(f"FAILED: {what}: {found} {said}")
+    return failed
+
+
 def main():
     node = shutil.which("node")
     if not node:
@@ -92,6 +149,7 @@ def main():
     if found != ["2.000000", "0.100000", "2.000000", "0.523599"]:
         failed += 1
         print(f"FAILED: a view is turned within its bounds as {found} {said}")
+    failed += viewer_failures(node, folder)
     print(f"{failed} failed")
     return 1 if failed else 0
 

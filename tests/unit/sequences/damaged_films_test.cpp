@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/files/files.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
@@ -234,6 +235,27 @@ TEST(DamagedFilms, NumberedFilesMayBeDamaged) {
     OpenOptions strict;
     strict.set.strict = true;
     EXPECT_FALSE(openSequence(path, strict, job));
+}
+
+TEST(DamagedFilms, FilesOfOtherViewsAreNotDamaged) {
+    TemporaryFolder folder;
+    MovingViews frames(3);
+    const auto path = folder / "f_%02d.exr";
+    Job job;
+    ASSERT_TRUE(saveSequence(frames, path, {}, job));
+    auto other = frames.frame(2, job);
+    ASSERT_TRUE(other);
+    std::swap(other->views[0], other->views[1]);
+    ASSERT_TRUE(saveBundle(*other, folder / "f_02.exr", {}, job));
+    for (const bool strict : {false, true}) {
+        OpenOptions options;
+        options.set.strict = strict;
+        const auto film = openSequence(path, options, job);
+        ASSERT_FALSE(film);
+        EXPECT_EQ(film.error().code, ErrorCode::invalidInput);
+        EXPECT_NE(film.error().text().find("f_02.exr': view 0 is '"), std::string::npos)
+            << film.error().text();
+    }
 }
 
 TEST(DamagedFilms, SamplesMayBeDamaged) {

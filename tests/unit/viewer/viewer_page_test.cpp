@@ -159,6 +159,53 @@ TEST(ViewerPage, WritesWhatStaysOfAFilmOnce) {
     EXPECT_EQ(page.json("data")["times"].size(), 3u);
 }
 
+/// A film of two views of which some frames have no point.
+class Gaps : public Sequence {
+  public:
+    explicit Gaps(std::vector<bool> points) : points_(std::move(points)) {
+        timeline_ = steadyTimeline(static_cast<int>(points_.size()), 10);
+    }
+    Result<Bundle> frame(std::size_t index, Job&) override {
+        Bundle bundle = smallBundle(2, 16, false, false);
+        bundle.time = timeline_.times[index];
+        if (points_[index]) return bundle;
+        for (ReferenceView& view : bundle.views) {
+            view.depth = Image<float>(view.camera.width, view.camera.height, kNoDepth);
+            view.texture = Rgba8Image(view.camera.width, view.camera.height);
+        }
+        return bundle;
+    }
+
+  private:
+    std::vector<bool> points_;
+};
+
+TEST(ViewerPage, FramesWithoutPointsShowTheBackground) {
+    const TemporaryFolder folder;
+    Job job;
+    const auto of = [&](std::vector<bool> points) {
+        Gaps film(std::move(points));
+        const auto report =
+            writeViewerPage(film, folder.path() / "a.html", {"film.mp4", {}, {}, {}}, job);
+        EXPECT_TRUE(report) << report.error().text();
+        return readPage(folder.path() / "a.html").json("data");
+    };
+    Json whole = of({true, true, true}), middle = of({true, false, true}),
+         start = of({false, true, true});
+    EXPECT_EQ(middle["frames"], Json::parse("[[0],[],[0]]"));
+    EXPECT_EQ(start["frames"], Json::parse("[[],[0],[0]]"));
+    // Where the page begins, and what it says of its points, is of a frame that has some.
+    for (Json* data : {&whole, &middle, &start}) data->erase("frames");
+    EXPECT_EQ(middle, whole);
+    EXPECT_EQ(start, whole);
+    Gaps none({false, false});
+    const auto refused =
+        writeViewerPage(none, folder.path() / "b.html", {"film.mp4", {}, {}, {}}, job);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().text(), "none of the views has a point");
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "b.html"));
+}
+
 /// Three cameras, each with a new picture every frame, every second and every third one.
 class ThreeRates : public Sequence {
   public:
