@@ -154,7 +154,10 @@ class Calls(Case):
 
     def test_what_is_saved_can_be_opened(self):
         def bundle(camera):
-            return stx.Bundle([stx.View(np.zeros((12, 16, 3), "u1"), np.full((12, 16), 2.0, "f4"), camera)])
+            # A second view, so that no origin is near both.
+            cameras = (camera, stx.Camera((16, 12), 20))
+            return stx.Bundle([stx.View(np.zeros((12, 16, 3), "u1"), np.full((12, 16), 2.0, "f4"), c, name=f"v{i}")
+                               for i, c in enumerate(cameras)])
         far = stx.Camera((16, 12), 20, world_from_camera=[[1, 0, 0, 4e38], [0, 1, 0, 0], [0, 0, 1, 0]])
         for camera, text in ((far, "the camera's position (4e+38 0 0) does not fit 32-bit floats; write .exr"),
                              (stx.Camera((16, 12), 1e-7), "the camera's fieldOfView would be 3.1415927 "),
