@@ -97,9 +97,8 @@ Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& wher
     return view;
 }
 
-/// Of depth of which nothing is said.
-Result<void> floatsOnly(Image<float>&, const Camera&, int largest, Job&) {
-    if (largest == 0) return {};
+/// Of integers of which nothing is said.
+Result<void> notSaid(Image<float>&, const Camera&, int, Job&) {
     return fail(ErrorCode::invalidInput,
                 "the depth is stored as integers; 'depthUnit', or 'nearPlane' and 'farPlane', must "
                 "tell what they mean");
@@ -180,7 +179,7 @@ Result<SetDescription> describeCamerasJson(const path& given, const ImageSetOpti
         STX_TRY(const std::string depth, needText(c, "depth", place));
         STX_TRY(view.depth, sourceInside(folder, depth, place, job.limits));
         STX_TRY(const auto told, camerasDistances(c, options, place));
-        view.distances = told ? *told : Distances(floatsOnly);
+        view.distances = told ? *told : orFloats(options, notSaid);
         view.time.reset();  // it is of one moment
     }
     return set;

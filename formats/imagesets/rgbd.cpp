@@ -48,10 +48,11 @@ Result<Intrinsics> intrinsicsIn(const path& file, Job& job) {
         if (!lastRow && n[0] != 0 && n[1] != 0)
             return Intrinsics{{n[0], n[1], n[2], n[3]}, lens, {}};
     }
-    return failAt(inQuotes(file.string()), ErrorCode::invalidInput,
-                  "{} numbers that are no camera; 'fx fy cx cy', 'fx fy cx cy k1 k2 p1 p2 k3' or "
-                  "the matrix 'fx 0 cx 0 fy cy 0 0 1' is expected, or give --intrinsics",
-                  n.size());
+    return failAt(
+        inQuotes(file.string()), ErrorCode::invalidInput,
+        "{} numbers that are not a camera; 'fx fy cx cy', 'fx fy cx cy k1 k2 p1 p2 k3' or "
+        "the matrix 'fx 0 cx 0 fy cy 0 0 1' is expected, or give --intrinsics",
+        n.size());
 }
 
 /// Given, else in a file, else those published for the recording.

@@ -91,7 +91,7 @@ std::optional<Bytes> plainObj(ByteSpan bytes) {
     bool continued = false, values = false, elements = false;
     for (std::size_t start = 0, end = 0; start < text.size(); start = end + 1) {
         end = std::min(text.find('\n', start), text.size());
-        auto line = trimmed(text.substr(start, end - start));
+        const auto line = trimmed(text.substr(start, end - start));
         if (!continued) {
             values = line.starts_with('v');
             elements = line.size() > 1 && (line[0] == 'f' || line[0] == 'l' || line[0] == 'p') &&

@@ -1,6 +1,5 @@
 #include "lib/model/from_origin.hpp"
 
-#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -52,10 +51,6 @@ class MovedViews : public ViewsOver {
                     planesOf(table)),
           by_(by) {
         move(about(), by);
-    }
-
-    std::uint64_t bytesToMake(std::size_t index) const override {
-        return std::max(table_.bytesToMake(index), bytesOf(index));
     }
 
   protected:

@@ -133,10 +133,6 @@ class OtherHeaders : public ViewsOver {
         for (std::size_t i = 0; i < count(); ++i) setHeader(about().views[i], headers[i]);
     }
 
-    std::uint64_t bytesToMake(std::size_t index) const override {
-        return std::max(table_.bytesToMake(index), bytesOf(index));
-    }
-
   protected:
     Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
         STX_TRY(auto read, table_.view(index, job));

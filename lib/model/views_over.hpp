@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <utility>
@@ -23,6 +25,10 @@ class ViewsOver : public ViewTable {
     std::string where() const override { return table_.where(); }
     bool knownSound() const override { return table_.knownSound(); }
     int mostAtOnce() const override { return table_.mostAtOnce(); }
+    /// Of those that are changed in place, or in a copy.
+    std::uint64_t bytesToMake(std::size_t index) const override {
+        return std::max(table_.bytesToMake(index), bytesOf(index));
+    }
 
   protected:
     /// `own`: the table, if this is to keep it; may be null.

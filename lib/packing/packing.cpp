@@ -464,8 +464,8 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
         if (covered < static_cast<std::int64_t>(given.count())) bleedColour(view.texture);
         if (!outside.empty()) fillOutside(outside, given, view.texture);
         // An atlas keeps room for normals when any view has them; give them back only to those.
-        // Zeros of emission say what no image says; those of metallic-roughness are a smooth
-        // surface that is no metal.
+        // Zeros of emission mean the same as no image; zeros of metallic-roughness are smooth
+        // plastic.
         dropIfZero(view.normal);
         dropIfZero(view.splatU);
         dropIfZero(view.splatV);

@@ -284,11 +284,11 @@ TEST(Intrinsics, NineNumbersOfTumAreAMatrixOrALens) {
     // By the formula of lens.hpp with k1 k2 p1 p2 k3, of all pixels.
     ASSERT_FALSE(notes.empty());
     EXPECT_NE(notes[0].find("lens distortion of up to 1.23 pixels"), std::string::npos) << notes[0];
-    const char* no = "9 numbers that are no camera; 'fx fy cx cy'";
+    const char* no = "9 numbers that are not a camera; 'fx fy cx cy'";
     expectNoCamera("tum", "20 0 0 0 21 0 11.5 7.5 1", no);    // by columns
     expectNoCamera("tum", "20 0.5 11.5 0 21 7.5 0 0 1", no);  // with a skew
     expectNoCamera("tum", "20 0 11.5 1 0 7.5 0 0 1", no);
-    expectNoCamera("tum", "20 21 11.5 7.5 0.1", "5 numbers that are no camera");
+    expectNoCamera("tum", "20 21 11.5 7.5 0.1", "5 numbers that are not a camera");
 }
 
 TEST(Intrinsics, OfOpen3dAreAMatrixByColumnsOfPicturesOfASize) {
