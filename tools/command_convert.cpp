@@ -123,8 +123,9 @@ Result<std::unique_ptr<ViewTable>> changedAsAsked(std::unique_ptr<ViewTable> tab
 
 /// One moment, of which each view is written when it is there.
 Result<Converted> convertStill(const std::filesystem::path& input,
-                               const std::filesystem::path& target, const ConvertOptions& o,
+                               const std::filesystem::path& named, const ConvertOptions& o,
                                bool countPoints, Program& program) {
+    const std::filesystem::path target = fileOfStill(named.string());
     const auto imported = std::make_shared<bool>(false);
     STX_TRY(auto opened, openMeshOrViews(input, openOptions(o, imported), program.job));
     auto* mesh = std::get_if<Mesh>(&opened);
@@ -348,10 +349,16 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
         STX_CHECK(command.refuse({"--bifs-version"}, "is of MPEG-4 containers, not of .exr"));
     }
     STX_CHECK(checkEnvironmentOptions(o.environment, command));
-    if (!o.frames.empty()) return convertFrames(o, program);
+    if (!o.frames.empty()) {
+        program.job.noteUnused(command.given({"--jobs"}), "of many inputs",
+                               "frames of one set are converted one after the other");
+        program.sayNotes();
+        return convertFrames(o, program);
+    }
     STX_TRY(const auto inputs, expandInputs(o.inputs, program.job.limits));
     STX_TRY(const auto items, planBatch(inputs, o.output));
     STX_CHECK(checkMeshViewOptions(*o.mesh, command, program));
+    if (items.size() > 1) STX_CHECK(command.refuse({"--plot"}, "is of one input"));
     STX_CHECK(containerOf(items[0].output));
     const BatchWork work = [&](const BatchItem& item, Program& p) {
         preloadCodecs(item.input);

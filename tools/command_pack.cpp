@@ -411,6 +411,7 @@ Result<int> packInput(const PackOptions& options, const Command& command, Progra
                         "a numbered name for one atlas each, as in -o 'atlas_%04d'",
                         o.input, count);
         STX_TRY(const auto moment, momentOf(o.time, timeline, nullptr, o.input, program.job));
+        if (numbered) o.output = *frameName(o.output, 0);
         return packMoment(o, *frames, moment, program);
     }
     if (!program.common.report.empty() && count > 1)

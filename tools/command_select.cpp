@@ -42,7 +42,7 @@ Result<int> selectAroundMesh(const Mesh& mesh, const SelectOptions& o, const Com
     bundle.title = std::filesystem::path(o.input).stem().string();
     SaveOptions save;
     save.noClobber = program.common.noClobber;
-    STX_CHECK(saveBundle(bundle, o.output, save, program.job));
+    STX_CHECK(saveBundle(bundle, fileOfStill(o.output), save, program.job));
     const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} → {}, {}, {}", std::filesystem::path(o.input).filename().string(),
@@ -143,7 +143,8 @@ Result<int> select(const SelectOptions& o, const Command& command, Program& prog
     if (oneByOne) {
         std::vector<std::size_t> kept(selection.views.begin(), selection.views.end());
         std::ranges::sort(kept);
-        STX_CHECK(saveViews(*someViewsOf(*oneByOne, std::move(kept)), o.output, save, program.job));
+        STX_CHECK(saveViews(*someViewsOf(*oneByOne, std::move(kept)), fileOfStill(o.output), save,
+                            program.job));
     } else if (timeline.moves()) {
         bundle = {};
         frames = changed(std::move(frames), [&](Bundle& frame, Job&) -> Result<void> {
@@ -153,7 +154,7 @@ Result<int> select(const SelectOptions& o, const Command& command, Program& prog
         STX_CHECK(saveSequence(*frames, o.output, save, program.job));
     } else {
         bundle = keepViews(std::move(bundle), selection.views);
-        STX_CHECK(saveBundle(bundle, o.output, save, program.job));
+        STX_CHECK(saveBundle(bundle, fileOfStill(o.output), save, program.job));
     }
     if (!o.plot.empty()) {
         const std::string svg =

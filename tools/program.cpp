@@ -418,6 +418,11 @@ bool isThere(const std::string& output) {
     return frameName(output, 0) && numberedFiles(output).has_value();
 }
 
+std::string fileOfStill(const std::string& output) {
+    const auto first = frameName(output, 0);
+    return first && lowerExtension(*first) == ".exr" ? *first : output;
+}
+
 Result<std::string> folderTarget(const std::string& target, const std::vector<std::string>& files,
                                  std::string_view expected) {
     if (target == "-")

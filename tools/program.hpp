@@ -114,6 +114,9 @@ class Program {
 [[nodiscard]] std::uint64_t bytesOf(const std::filesystem::path& path);
 /// Whether an output is there: a file or a folder, or one of the files of a numbered name.
 [[nodiscard]] bool isThere(const std::string& output);
+/// The file that a bundle without frames goes to: of a numbered OpenEXR name the first, as a film
+/// of one frame has it; else `output`.
+[[nodiscard]] std::string fileOfStill(const std::string& output);
 /// A target that may be a folder, without slashes at its end. Error (usage) when it ends like a
 /// file, neither exists as a folder nor has a slash, and is none of `files` (".ply"); `expected` is
 /// for the message.
