@@ -15,14 +15,16 @@ using namespace stx;
 using namespace stx::mpeg4;
 
 /// Whether a name may have a character that is written as '_', or begins as a number does and gets
-/// a '_' before it: names in buffers are bytes of these.
-static bool mayRename(std::string_view text) {
+/// a '_' before it: names in buffers are bytes of these. DEF may be written in small letters.
+static bool mayRename(std::string text) {
+    std::ranges::transform(text, text.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
     for (auto at = text.find("DEF"); at != text.npos; at = text.find("DEF", at + 3)) {
         const auto name = text.find_first_not_of(" \t\r\n,", at + 3);
         if (name == text.npos) continue;
         if (std::strchr("-0123456789", text[name])) return true;
         const auto end = std::min(text.find_first_of(" \t\r\n,{[", name), text.size());
-        if (text.substr(name, end - name).find_first_of("+.") != text.npos) return true;
+        if (text.substr(name, end - name).find_first_of("+.'\"#") != text.npos) return true;
     }
     return std::ranges::any_of(text, [](char c) {
         return std::ispunct(static_cast<unsigned char>(c))
@@ -38,7 +40,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto trip = textRoundTrip(text, readBt, writeBt, job);
     if (!trip) return 0;
     // What was written has plain names.
-    const auto plain = mayRename(text) ? textRoundTrip(trip->written, readBt, writeBt, job) : trip;
+    const auto plain =
+        mayRename(std::string(text)) ? textRoundTrip(trip->written, readBt, writeBt, job) : trip;
     if (!plain) violated("what is written reads");
     if (!sameFrames(plain->document.frames, plain->again.frames, {.ids = false, .names = false}))
         violated("what is written reads back the same");
