@@ -102,7 +102,7 @@ Json environmentJson(const Environment& e, glm::ivec2 size, const std::vector<Cu
 void addBackground(const mpeg4::Document& document, const mpeg4::StreamImages& images, Json& out,
                    const Limits& limits) {
     if (document.frames.empty()) return;
-    const auto scene = mpeg4::composeScene(document.frames, document.frames.front().time);
+    const auto scene = mpeg4::sceneAtStart(document, images, false);
     const auto shown = scene ? mpeg4::shownScene(scene->root, limits)
                              : Result<mpeg4::ShownScene>(tl::unexpected(scene.error()));
     if (!shown || shown->backgrounds.empty()) return;

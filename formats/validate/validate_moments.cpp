@@ -8,7 +8,10 @@ namespace stx {
 
 using namespace mpeg4;
 
-bool changesLater(const Document& document) {
+namespace {
+
+/// Whether other pictures or nodes may come: clocks only move what is there.
+bool picturesChange(const Document& document) {
     return document.frames.size() > 1 || document.odFrames.size() > 1 ||
            std::ranges::any_of(document.odFrames, [](const OdFrame& frame) {
                return std::ranges::any_of(frame.commands, [](const OdCommand& command) {
@@ -23,6 +26,20 @@ bool changesLater(const Document& document) {
            });
 }
 
+}  // namespace
+
+bool changesLater(const Document& document) {
+    // A clock moves something along a ROUTE only; those of commands come with them.
+    const auto hasRoutes = [](const Command& command) {
+        const auto* scene = std::get_if<ReplaceScene>(&command);
+        return std::holds_alternative<InsertRoute>(command) || (scene && !scene->routes.empty());
+    };
+    return picturesChange(document) ||
+           std::ranges::any_of(document.frames, [&](const CommandFrame& frame) {
+               return std::ranges::any_of(frame.commands, hasRoutes);
+           });
+}
+
 void checkLaterMoments(Document document, const std::filesystem::path& folder, Findings& findings,
                        Job& job) {
     constexpr std::size_t kMostFindings = 20;  // more of the kind say no more
@@ -30,6 +47,7 @@ void checkLaterMoments(Document document, const std::filesystem::path& folder, F
     quiet.workFor(job);
     SceneReadOptions read;
     read.folder = folder;
+    const bool pixels = picturesChange(document);
     const auto frames = sequenceFromScene(std::move(document), read, quiet);
     if (!frames) {
         findings.add(2032, "scene", frames.error().text(), "moments that can be read");
@@ -41,6 +59,7 @@ void checkLaterMoments(Document document, const std::filesystem::path& folder, F
         if (!job.checkCancelled()) return;
         const auto sound = [&]() -> Result<void> {
             STX_TRY(const auto table, (*frames)->views(i, quiet));
+            if (!pixels) return {};
             return forEachView(*table, {"reading", 0}, quiet,
                                [](std::size_t, const auto&) { return Result<void>(); });
         }();

@@ -8,8 +8,7 @@
 
 namespace stx {
 
-/// Whether a presentation changes by commands, or by pictures of its streams. What only
-/// interpolators move is as sound as the rest.
+/// Whether a presentation may change by commands, by pictures of its streams or by clocks.
 [[nodiscard]] bool changesLater(const mpeg4::Document& document);
 
 /// Rule 2032: reads each moment but the first, of which the other rules are asked. `folder` is that

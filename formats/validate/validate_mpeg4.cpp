@@ -7,7 +7,7 @@
 
 #include "formats/mpeg4/mapping/octree.hpp"
 #include "formats/mpeg4/mapping/point_texture.hpp"
-#include "formats/mpeg4/mapping/stream_images.hpp"
+#include "formats/mpeg4/mapping/scene_timeline.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/mpeg4/scene/events.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
@@ -210,16 +210,16 @@ class DocumentValidator {
             add(2033, "scene", broken, "a key for each keyValue, in ascending order");
         if (const auto last = composeScene(document_.frames); !last)
             add(2031, "scene", last.error().text(), "commands that fit");
-        const auto scene = composeScene(document_.frames, document_.frames[0].time);
+        auto images = StreamImages::make(document_, source_.folder, job_.limits);
+        if (!images) return;
+        images_ = &*images;
+        const auto scene = sceneAtStart(document_, *images, false);
         if (!scene) return;
         const auto shown = shownScene(scene->root, job_.limits);
         if (!shown) {
             add(2031, "scene", shown.error().text(), "a scene that can be walked");
             return;
         }
-        auto images = StreamImages::make(document_, source_.folder, job_.limits);
-        if (!images) return;
-        images_ = &*images;
         int index = 0;
         for (const ShownNode& node : shown->nodes) {
             const auto world = similarityFrom(node.worldFromLocal);
@@ -370,6 +370,8 @@ class DocumentValidator {
             add(4009, where, "a texture without images", "texture and depth");
             return;
         }
+        if (inOctree && !colour)
+            add(4013, where, "an image without texture", "one, since depth is not used");
         const auto colourInfo = colour ? pictures().probe(*colour, "texture", where) : std::nullopt;
         const auto depthInfo = depth ? pictures().probe(*depth, "depth", where) : std::nullopt;
         const bool hasAlpha =

@@ -87,6 +87,9 @@ class BifsEncoder {
     [[nodiscard]] Result<CommandBuffer> encodeBuffer(const std::vector<Command>& commands,
                                                      const std::unordered_set<const Node*>& brought,
                                                      bool useNames);
+    /// By how much a QuantizationParameter has rounded values so far, at most: numbers as they are,
+    /// rotations in radians.
+    [[nodiscard]] double mostRounded() const;
 
   private:
     struct Impl;

@@ -127,6 +127,10 @@ Result<Bytes> BifsEncoder::encode(const std::vector<Command>& commands) {
     return impl_->encode(commands);
 }
 
+double BifsEncoder::mostRounded() const {
+    return impl_->mostRounded;
+}
+
 Result<CommandBuffer> BifsEncoder::encodeBuffer(const std::vector<Command>& commands,
                                                 const std::unordered_set<const Node*>& brought,
                                                 bool useNames) {

@@ -52,36 +52,48 @@ double steps(int bits) {
 }
 
 /// A number in [-1, 1] in one bit of sign and the rest of size, biased.
-float readSigned(BitReader& in, int bits) {
+float signedFrom(std::uint32_t code, int bits) {
     const std::int64_t half = std::int64_t{1} << (bits - 1);
-    const std::int64_t value = static_cast<std::int64_t>(in.read(bits)) - half;
+    const std::int64_t value = static_cast<std::int64_t>(code) - half;
     return bits < 2 ? 0.0f : static_cast<float>(static_cast<double>(value) / steps(bits - 1));
 }
 
-void writeSigned(BitWriter& out, int bits, double value) {
+/// Gives what is read back.
+float writeSigned(BitWriter& out, int bits, double value) {
     const double half = static_cast<double>(std::int64_t{1} << (bits - 1));
     const double coded =
         bits < 2 ? half : half + std::round(std::clamp(value, -1.0, 1.0) * steps(bits - 1));
-    out.write(static_cast<std::uint32_t>(std::clamp(coded, 0.0, steps(bits))), bits);
+    const auto code = static_cast<std::uint32_t>(std::clamp(coded, 0.0, steps(bits)));
+    out.write(code, bits);
+    return signedFrom(code, bits);
 }
 
 constexpr double kQuarterPi = std::numbers::pi / 4;
 
-/// A unit vector of `count` + 1 numbers from its `count` angles against the largest of them.
+/// A unit vector of `count` + 1 numbers from its `count` angles against the largest of them, in
+/// quarters of pi.
 template <int Count>
-std::array<double, Count + 1> readOnSphere(BitReader& in, int bits, double direction) {
-    const int largest = static_cast<int>(in.read(2)) % (Count + 1);
+std::array<double, Count + 1> onSphere(int largest, const std::array<float, Count>& angles,
+                                       double direction) {
     std::array<double, Count> tangents{};
     double length = 1;
-    for (double& tangent : tangents) {
-        tangent = std::tan(kQuarterPi * readSigned(in, bits));
-        length += tangent * tangent;
+    for (int i = 0; i < Count; ++i) {
+        tangents[i] = std::tan(kQuarterPi * angles[i]);
+        length += tangents[i] * tangents[i];
     }
     const double scale = direction / std::sqrt(length);
     std::array<double, Count + 1> vector{};
     vector[largest] = scale;
     for (int i = 0; i < Count; ++i) vector[(largest + i + 1) % (Count + 1)] = tangents[i] * scale;
     return vector;
+}
+
+template <int Count>
+std::array<double, Count + 1> readOnSphere(BitReader& in, int bits, double direction) {
+    const int largest = static_cast<int>(in.read(2)) % (Count + 1);
+    std::array<float, Count> angles{};
+    for (float& angle : angles) angle = signedFrom(in.read(bits), bits);
+    return onSphere<Count>(largest, angles, direction);
 }
 
 template <int Count>
@@ -93,15 +105,39 @@ int largestOf(const std::array<double, Count + 1>& vector) {
     return largest;
 }
 
+/// Gives what is read back.
 template <int Count>
-void writeOnSphere(BitWriter& out, int bits, const std::array<double, Count + 1>& vector,
-                   int largest) {
+std::array<double, Count + 1> writeOnSphere(BitWriter& out, int bits,
+                                            const std::array<double, Count + 1>& vector,
+                                            int largest, double direction) {
     out.write(static_cast<std::uint32_t>(largest), 2);
+    std::array<float, Count> angles{};
     for (int i = 0; i < Count; ++i) {
         const double other = vector[(largest + i + 1) % (Count + 1)];
         const double base = vector[largest];
-        writeSigned(out, bits, base == 0 ? 0 : std::atan(other / base) / kQuarterPi);
+        angles[i] = writeSigned(out, bits, base == 0 ? 0 : std::atan(other / base) / kQuarterPi);
     }
+    return onSphere<Count>(largest, angles, direction);
+}
+
+float linearFrom(std::uint32_t code, const QuantisedCoding& coding, int component) {
+    const double low = coding.minimum[component];
+    return static_cast<float>(low + (coding.maximum[component] - low) * code / steps(coding.bits));
+}
+
+glm::vec3 normalFrom(const std::array<double, 3>& v) {
+    return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+}
+
+/// Of a quaternion w x y z.
+Rotation rotationFrom(const std::array<double, 4>& q) {
+    const double halfSine = std::sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    if (halfSine < 1e-9) return {};
+    Rotation rotation;
+    rotation.axis = {static_cast<float>(q[1] / halfSine), static_cast<float>(q[2] / halfSine),
+                     static_cast<float>(q[3] / halfSine)};
+    rotation.angle = static_cast<float>(2 * std::atan2(halfSine, q[0]));
+    return rotation;
 }
 
 }  // namespace
@@ -186,51 +222,45 @@ void QuantisationScope::ListGuard::coded(const NodePtr& item) {
 }
 
 float readQuantised(BitReader& in, const QuantisedCoding& coding, int component) {
-    const double low = coding.minimum[component];
-    return static_cast<float>(low + (coding.maximum[component] - low) * in.read(coding.bits) /
-                                        steps(coding.bits));
+    return linearFrom(in.read(coding.bits), coding, component);
 }
 
-void writeQuantised(BitWriter& out, const QuantisedCoding& coding, int component, float value) {
+float writeQuantised(BitWriter& out, const QuantisedCoding& coding, int component, float value) {
     const double low = coding.minimum[component];
     const double range = coding.maximum[component] - low;
     const double share = range > 0 ? (static_cast<double>(value) - low) / range : 0;
     const double inside = std::isnan(share) ? 0 : share;  // of infinite bounds
-    out.write(static_cast<std::uint32_t>(std::round(inside * steps(coding.bits))), coding.bits);
+    const auto code = static_cast<std::uint32_t>(std::round(inside * steps(coding.bits)));
+    out.write(code, coding.bits);
+    return linearFrom(code, coding, component);
 }
 
 glm::vec3 readQuantisedNormal(BitReader& in, const QuantisedCoding& coding) {
     const double direction = in.flag() ? -1 : 1;
-    const auto v = readOnSphere<2>(in, coding.bits, direction);
-    return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+    return normalFrom(readOnSphere<2>(in, coding.bits, direction));
 }
 
-void writeQuantisedNormal(BitWriter& out, const QuantisedCoding& coding, const glm::vec3& normal) {
+glm::vec3 writeQuantisedNormal(BitWriter& out, const QuantisedCoding& coding,
+                               const glm::vec3& normal) {
     const std::array<double, 3> v = {normal.x, normal.y, normal.z};
     const int largest = largestOf<2>(v);
-    out.flag(v[largest] < 0);
-    writeOnSphere<2>(out, coding.bits, v, largest);
+    const bool turned = v[largest] < 0;
+    out.flag(turned);
+    return normalFrom(writeOnSphere<2>(out, coding.bits, v, largest, turned ? -1 : 1));
 }
 
 Rotation readQuantisedRotation(BitReader& in, const QuantisedCoding& coding) {
-    const auto q = readOnSphere<3>(in, coding.bits, 1);
-    const double halfSine = std::sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    if (halfSine < 1e-9) return {};
-    Rotation rotation;
-    rotation.axis = {static_cast<float>(q[1] / halfSine), static_cast<float>(q[2] / halfSine),
-                     static_cast<float>(q[3] / halfSine)};
-    rotation.angle = static_cast<float>(2 * std::atan2(halfSine, q[0]));
-    return rotation;
+    return rotationFrom(readOnSphere<3>(in, coding.bits, 1));
 }
 
-void writeQuantisedRotation(BitWriter& out, const QuantisedCoding& coding,
-                            const Rotation& rotation) {
+Rotation writeQuantisedRotation(BitWriter& out, const QuantisedCoding& coding,
+                                const Rotation& rotation) {
     const double length = std::sqrt(static_cast<double>(glm::dot(rotation.axis, rotation.axis)));
     const double half = rotation.angle / 2.0;
     const double scale = length > 0 ? std::sin(half) / length : 0;
     const std::array<double, 4> q = {std::cos(half), rotation.axis.x * scale,
                                      rotation.axis.y * scale, rotation.axis.z * scale};
-    writeOnSphere<3>(out, coding.bits, q, largestOf<3>(q));
+    return rotationFrom(writeOnSphere<3>(out, coding.bits, q, largestOf<3>(q), 1));
 }
 
 float readEfficientFloat(BitReader& in) {
@@ -250,11 +280,14 @@ float readEfficientFloat(BitReader& in) {
                                 mantissa << 9);
 }
 
-void writeEfficientFloat(BitWriter& out, float value) {
+float writeEfficientFloat(BitWriter& out, float value) {
     const auto bits = std::bit_cast<std::uint32_t>(value);
     const int exponent = static_cast<int>(bits >> 23 & 0xFF) - 127;
     // Infinities have no code and become the largest number.
-    if (bits == 0) return out.write(0, 4);
+    if (bits == 0) {
+        out.write(0, 4);
+        return 0;
+    }
     if (exponent == 128)
         return writeEfficientFloat(out, std::copysign(std::numeric_limits<float>::max(), value));
     const std::uint32_t mantissa = (bits & 0x7FFFFF) >> 9;
@@ -269,6 +302,7 @@ void writeEfficientFloat(BitWriter& out, float value) {
         out.flag(exponent < 0);
         out.write(size, exponentBits - 1);
     }
+    return std::bit_cast<float>(bits >> 9 << 9);
 }
 
 }  // namespace stx::mpeg4

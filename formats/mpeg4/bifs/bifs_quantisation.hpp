@@ -72,18 +72,19 @@ class QuantisationScope {
 };
 
 [[nodiscard]] float readQuantised(BitReader& in, const QuantisedCoding& coding, int component);
-/// `value` must be within the bounds.
-void writeQuantised(BitWriter& out, const QuantisedCoding& coding, int component, float value);
+/// `value` must be within the bounds. Gives what is read back, as the other writers here do.
+float writeQuantised(BitWriter& out, const QuantisedCoding& coding, int component, float value);
 
 /// Two or three numbers on the unit sphere (normals and rotations).
 [[nodiscard]] glm::vec3 readQuantisedNormal(BitReader& in, const QuantisedCoding& coding);
-void writeQuantisedNormal(BitWriter& out, const QuantisedCoding& coding, const glm::vec3& normal);
+glm::vec3 writeQuantisedNormal(BitWriter& out, const QuantisedCoding& coding,
+                               const glm::vec3& normal);
 [[nodiscard]] Rotation readQuantisedRotation(BitReader& in, const QuantisedCoding& coding);
-void writeQuantisedRotation(BitWriter& out, const QuantisedCoding& coding,
-                            const Rotation& rotation);
+Rotation writeQuantisedRotation(BitWriter& out, const QuantisedCoding& coding,
+                                const Rotation& rotation);
 
 /// The short form of floats: 15 bits of mantissa at most.
 [[nodiscard]] float readEfficientFloat(BitReader& in);
-void writeEfficientFloat(BitWriter& out, float value);
+float writeEfficientFloat(BitWriter& out, float value);
 
 }  // namespace stx::mpeg4

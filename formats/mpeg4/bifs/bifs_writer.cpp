@@ -1,7 +1,10 @@
 #include "formats/mpeg4/bifs/bifs_writer.hpp"
 
+#include <cmath>
+
 #include "formats/mpeg4/bifs/interface_types.hpp"
 #include "formats/mpeg4/bifs/script_code.hpp"
+#include "lib/geometry/camera.hpp"
 
 namespace stx::mpeg4 {
 
@@ -9,9 +12,22 @@ namespace stx::mpeg4 {
 
 void BifsNodeWriter::writeFloat(float value) {
     if (quantisation.usesEfficientFloats())
-        writeEfficientFloat(out, value);
+        addRounding(value, writeEfficientFloat(out, value));
     else
         out.write(std::bit_cast<std::uint32_t>(value), 32);
+}
+
+void BifsNodeWriter::addRounding(float value, float readBack) {
+    mostRounded = std::max(mostRounded, std::abs(static_cast<double>(value) - readBack));
+}
+void BifsNodeWriter::addRounding(const Rotation& value, const Rotation& readBack) {
+    if (value == readBack) return;
+    const auto quat = [](const Rotation& r) {
+        return quatFromAxisAngle(glm::dvec4(r.axis, r.angle));
+    };
+    const glm::dquat turn = quat(value) * glm::conjugate(quat(readBack));
+    const double halfSine = glm::length(glm::dvec3(turn.x, turn.y, turn.z));
+    mostRounded = std::max(mostRounded, 2 * std::atan2(halfSine, std::abs(turn.w)));
 }
 
 Result<void> BifsNodeWriter::writeString(const std::string& text) {
@@ -70,7 +86,8 @@ Result<void> BifsNodeWriter::writeComponent(const Coding& coding, int component,
             "the value {} is not within {} to {}, the bounds that it has while a "
             "QuantizationParameter is active; widen the bounds of that node or remove it",
             value, static_cast<float>(low), static_cast<float>(high));
-    return writeQuantised(out, *coding, component, value), Result<void>{};
+    addRounding(value, writeQuantised(out, *coding, component, value));
+    return {};
 }
 Result<void> BifsNodeWriter::write(const glm::vec2& value, const Coding& coding) {
     for (int i = 0; i < 2; ++i) STX_CHECK(writeComponent(coding, i, value[i]));
@@ -78,7 +95,8 @@ Result<void> BifsNodeWriter::write(const glm::vec2& value, const Coding& coding)
 }
 Result<void> BifsNodeWriter::write(const glm::vec3& value, const Coding& coding) {
     if (coding && coding->kind == QuantisedCoding::Kind::normal) {
-        writeQuantisedNormal(out, *coding, value);
+        const glm::vec3 readBack = writeQuantisedNormal(out, *coding, value);
+        for (int i = 0; i < 3; ++i) addRounding(value[i], readBack[i]);
         return {};
     }
     for (int i = 0; i < 3; ++i) STX_CHECK(writeComponent(coding, i, value[i]));
@@ -89,7 +107,7 @@ Result<void> BifsNodeWriter::write(const Color& value, const Coding& coding) {
 }
 Result<void> BifsNodeWriter::write(const Rotation& value, const Coding& coding) {
     if (coding) {
-        writeQuantisedRotation(out, *coding, value);
+        addRounding(value, writeQuantisedRotation(out, *coding, value));
         return {};
     }
     for (int i = 0; i < 3; ++i) writeFloat(value.axis[i]);

@@ -27,6 +27,7 @@ struct BifsNodeWriter {
     ProtoLinks links;              ///< of that PROTO
     bool useNames = false;
     QuantisationScope quantisation;
+    double mostRounded = 0;  ///< BifsEncoder::mostRounded()
     BitWriter out;
     int maxNesting = Limits().maxNesting;
 
@@ -53,6 +54,9 @@ struct BifsNodeWriter {
     using Coding = std::optional<QuantisedCoding>;
 
     void writeFloat(float value);
+    /// A value that is read back as another, or as the same.
+    void addRounding(float value, float readBack);
+    void addRounding(const Rotation& value, const Rotation& readBack);
     Result<void> writeComponent(const Coding& coding, int component, float value);
     Result<void> writeString(const std::string& text);
     Result<void> writeName(const std::string& text);

@@ -301,6 +301,10 @@ class Writer {
                                        encode(encoder, document_.frames[i], config)));
             addFrame(track, std::move(bytes), document_.frames[i]);
         }
+        if (encoder.mostRounded() > 0)
+            job_.note(fmt::format(
+                "a QuantizationParameter rounds values of the scene: at most {:.4g} off",
+                encoder.mostRounded()));
         STX_CHECK(finish(track, "the scene"));
         return track;
     }

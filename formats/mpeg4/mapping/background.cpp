@@ -5,6 +5,7 @@
 #include <glm/gtc/constants.hpp>
 
 #include "formats/mpeg4/mapping/new_document.hpp"
+#include "formats/mpeg4/mapping/scene_timeline.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "lib/environment/environment_map.hpp"
 
@@ -214,9 +215,9 @@ Result<std::shared_ptr<const Environment>> environmentFromScene(const Document& 
                                                                 Job& job) {
     std::shared_ptr<const Environment> none;
     if (document.frames.empty()) return none;
-    STX_TRY(const auto scene, composeScene(document.frames, document.frames.front().time));
-    STX_TRY(const auto shown, shownScene(scene.root, job.limits));
     STX_TRY(const auto images, StreamImages::make(document, options.folder, job.limits));
+    STX_TRY(const auto scene, sceneAtStart(document, images, options.timesFromStart));
+    STX_TRY(const auto shown, shownScene(scene.root, job.limits));
     return boundEnvironment(shown.backgrounds, images, options.decode, job);
 }
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <set>
 #include <unordered_map>
@@ -40,7 +41,7 @@ class BundleReader {
     /// The object as a scene has it. With `still`, says what moves: the moment is all that is read.
     Result<Bundle> read(const Scene& scene, const ShownScene& shown, const StreamImages& images,
                         bool still) {
-        STX_TRY(const auto object, objectOf(scene, shown, still));
+        STX_TRY(const auto object, objectOf(scene, shown, images, still));
         return read(object, images);
     }
     Result<Bundle> read(const Object& object, const StreamImages& images) {
@@ -83,7 +84,8 @@ class BundleReader {
         return bundle;
     }
 
-    Result<Object> objectOf(const Scene& scene, const ShownScene& shown, bool still) {
+    Result<Object> objectOf(const Scene& scene, const ShownScene& shown, const StreamImages& images,
+                            bool still) {
         if (!shown.leftOut.empty())
             job_.note(fmt::format("the scene has nodes that are no views; they are left out: {}",
                                   fmt::join(shown.leftOut, ", ")));
@@ -99,13 +101,13 @@ class BundleReader {
         object.about.title = shown.title;
         object.backgrounds = shown.backgrounds;
         if (object.plans.empty() && options_.mayBeEmpty) return object;
-        if (still && options_.noteMotion) noteMotion(scene, shown);
+        if (still && options_.noteMotion) noteMotion(scene, shown, images);
         if (object.plans.empty())
             return fail(ErrorCode::invalidInput,
                         "the scene shows no DepthImage or OctreeImage with a texture; at least one "
                         "is expected");
         object.about.bounds = object.notes.bounds;
-        object.about.origin = object.notes.origin;
+        object.about.origin = object.notes.origin.value_or(glm::dvec3(0.0));
         object.about.time = object.notes.start;
         // Frames of a film last as its Timeline says.
         if (still && !mayMove(scene)) object.about.duration = object.notes.duration;
@@ -154,15 +156,22 @@ class BundleReader {
 
   private:
     /// What all WorldInfo say. Bounds are moved as the WorldInfo is; they hold only when each
-    /// object is moved with one.
+    /// object is moved with one. All count from the first origin: what is beside another is moved.
     ViewNotes notesOf(const ShownScene& shown, std::vector<ViewPlan>& plans) {
         ViewNotes all;
         std::vector<std::string> lost;
         std::vector<glm::dmat4> places;
+        std::unordered_map<int, glm::dvec3> shifts;  // of what is beside each origin
         for (const ShownInfo& info : shown.infos) {
             ViewNotes notes = ViewNotes::parse(info.text);
             takeViews(all, notes, info.parent, plans, lost);
-            if (all.origin == glm::dvec3(0.0)) all.origin = notes.origin;
+            if (notes.origin) {
+                const glm::dvec3 origin = glm::dmat3(info.worldFromLocal) * *notes.origin;
+                if (!all.origin && std::isfinite(origin.x + origin.y + origin.z))
+                    all.origin = origin;
+                if (all.origin) shifts.emplace(info.parent, origin - *all.origin);
+            }
+            const auto shift = shifts.find(info.parent);
             if (!all.start) all.start = notes.start;
             if (!all.duration) all.duration = notes.duration;
             if (!notes.bounds) continue;
@@ -172,13 +181,16 @@ class BundleReader {
                 const Bounds& b = *notes.bounds;
                 const glm::dvec4 p(corner & 1 ? b.max.x : b.min.x, corner & 2 ? b.max.y : b.min.y,
                                    corner & 4 ? b.max.z : b.min.z, 1.0);
-                all.bounds->add(glm::dvec3(info.worldFromLocal * p));
+                all.bounds->add(glm::dvec3(info.worldFromLocal * p) +
+                                (shift == shifts.end() ? glm::dvec3(0.0) : shift->second));
             }
         }
         for (ViewPlan& plan : plans) {
             if (const auto at = all.views.find(plan.key);
                 at != all.views.end() && !at->second.name.empty())
                 plan.name = at->second.name;
+            if (const auto shift = shifts.find(plan.parent); shift != shifts.end())
+                plan.worldFromLocal.translation += shift->second;
         }
         if (!lost.empty())
             job_.note(
@@ -308,23 +320,17 @@ class BundleReader {
                });
     }
     /// Says what would change the views in time, besides commands.
-    void noteMotion(const Scene& scene, const ShownScene& shown) {
-        std::unordered_map<int, std::size_t> pictures;
-        for (const ObjectDescriptor* od : document_.objectDescriptors())
-            if (!od->streams.empty()) pictures[od->id] = od->streams[0].samples.size();
+    void noteMotion(const Scene& scene, const ShownScene& shown, const StreamImages& images) {
         std::unordered_set<const Node*> inViews = shown.above;
-        std::unordered_set<int> moving;
+        std::unordered_set<const ElementaryStream*> moving;
         // Views share nodes, so all are walked as one graph.
         const NodePtr all = makeNode("Group");
         for (const ShownNode& view : shown.nodes)
             all->edit<NodeList>("children").push_back(view.node);
         forEachNode(all, [&](const NodePtr& node) {
             inViews.insert(node.get());
-            const int url = node->info->find("url");
-            const auto* urls = url < 0 ? nullptr : std::get_if<std::vector<Url>>(&node->value(url));
-            if (urls == nullptr || urls->empty()) return;
-            const auto found = pictures.find(urls->front().objectDescriptorId);
-            if (found != pictures.end() && found->second > 1) moving.insert(found->first);
+            const ElementaryStream* stream = images.stream(*node);
+            if (stream && stream->samples.size() > 1) moving.insert(stream);
         });
         const auto routes =
             std::count_if(scene.routes.begin(), scene.routes.end(),
@@ -402,8 +408,9 @@ class BundleReader {
                                   texture ? "images" : "diTexture"));
             return;
         }
+        // A PointTexture has depths of its own.
         plans.push_back({image, texture, world, freeName(image), fmt::format("{}", plans.size()),
-                         parent, number, octree});
+                         parent, number, isPoints ? nullptr : octree});
     }
 
     const Document& document_;
@@ -462,7 +469,7 @@ Result<std::unique_ptr<ViewTable>> viewsOfMoment(std::shared_ptr<const Document>
                                                  const SceneReadOptions& options, bool still,
                                                  Job& job) {
     BundleReader reader(*document, options, job);
-    STX_TRY(auto object, reader.objectOf(scene, shown, still));
+    STX_TRY(auto object, reader.objectOf(scene, shown, *images, still));
     auto headers = reader.headersOf(object, *images);
     if (!headers || headers->bundle.views.size() > static_cast<std::size_t>(job.limits.maxViews)) {
         STX_TRY(auto bundle, reader.read(object, *images));
@@ -479,8 +486,8 @@ Result<std::unique_ptr<ViewTable>> viewsFromScene(std::shared_ptr<const Document
                                                   const SceneReadOptions& options, Job& job) {
     if (document->frames.empty())
         return fail(ErrorCode::invalidInput, "the presentation has no scene");
-    STX_TRY(const auto scene, composeScene(document->frames, document->frames.front().time));
     STX_TRY(auto images, StreamImages::make(*document, options.folder, job.limits));
+    STX_TRY(const auto scene, sceneAtStart(*document, images, options.timesFromStart));
     STX_TRY(const auto shown, shownScene(scene.root, job.limits));
     return viewsOfMoment(std::move(document), scene, shown,
                          std::make_shared<StreamImages>(std::move(images)), options, true, job);
@@ -490,8 +497,8 @@ Result<Bundle> bundleFromScene(const Document& document, const SceneReadOptions&
                                Job& job) {
     if (document.frames.empty())
         return fail(ErrorCode::invalidInput, "the presentation has no scene");
-    STX_TRY(const auto scene, composeScene(document.frames, document.frames.front().time));
     STX_TRY(const auto images, StreamImages::make(document, options.folder, job.limits));
+    STX_TRY(const auto scene, sceneAtStart(document, images, options.timesFromStart));
     STX_TRY(const auto shown, shownScene(scene.root, job.limits));
     return BundleReader(document, options, job).read(scene, shown, images, true);
 }

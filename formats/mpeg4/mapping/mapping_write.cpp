@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/mapping/mapping.hpp"
@@ -28,7 +29,7 @@ class SceneWriter {
     Result<Document> write() {
         STX_CHECK(checkRequest());
         ViewNotes notes;
-        notes.origin = bundle_.origin;
+        if (bundle_.origin != glm::dvec3(0.0)) notes.origin = bundle_.origin;
         // A presentation begins at 0: players would wait for 40 years where a film begins at Unix
         // time, edit lists cannot begin before 0, and texts have none.
         if (bundle_.time.value_or(0) != 0) notes.start = bundle_.time;
@@ -169,7 +170,8 @@ class SceneWriter {
         root.set("children", std::move(children));
     }
 
-    /// The WorldInfo is in the frame of the octree's cube, so that its bounds follow it.
+    /// The WorldInfo is in the frame of the octree's cube, so that its bounds follow it; that of
+    /// the origin is outside, where nothing scales it.
     Result<NodePtr> octreeGroup(ViewNotes& notes) {
         STX_TRY(auto parts, octreeFromBundle(bundle_, options_.octreeLevels, job_));
         NodePtr octree = makeNode("OctreeImage");
@@ -189,14 +191,20 @@ class SceneWriter {
         for (const ReferenceView& view : bundle_.views)
             vectorsLost_ = vectorsLost_ || view.hasNormals() || view.hasSplats();
         if (vectorsLost_) job_.note("an OctreeImage has no normals and splats: they are left out");
+        if (std::ranges::any_of(bundle_.views, &ReferenceView::background))
+            job_.note(
+                "an OctreeImage has no background: what was behind becomes part of the object");
         notes.bounds = parts.used;
         sayTotals();
         if (parts.isUnitCube()) return groupOf({octree}, notes);
         notes.bounds->min = (notes.bounds->min - parts.centre) / parts.side;
         notes.bounds->max = (notes.bounds->max - parts.centre) / parts.side;
+        ViewNotes outside;
+        outside.origin = std::exchange(notes.origin, {});
         NodePtr transform = groupOf({octree}, notes, "Transform");
         transform->set("translation", glm::vec3(parts.centre));
         transform->set("scale", glm::vec3(static_cast<float>(parts.side)));
+        if (outside.origin) return groupOf({transform}, outside);
         NodePtr group = makeNode("Group");
         group->set("children", NodeList{transform});
         return group;
@@ -263,7 +271,7 @@ class SceneWriter {
     [[nodiscard]] std::size_t layersFrom(std::size_t first) const {
         std::size_t n = 1;
         while (first + n < bundle_.views.size() &&
-               isLayerOf(bundle_.views[first + n], bundle_.views[first]))
+               isLayerOf(bundle_.views[first + n], bundle_.views[first], n))
             ++n;
         return n;
     }

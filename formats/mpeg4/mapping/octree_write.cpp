@@ -48,8 +48,8 @@ void forEachPoint(const ReferenceView& view, double voxel, Body body) {
             const auto pixel = static_cast<std::size_t>(y) * width + x;
             const glm::dvec3 p = view.worldPoint(x, y);
             body(p, pixel);
-            const double step =
-                (c.orthographic ? 1.0 : static_cast<double>(view.depth.at(x, y))) / c.fx;
+            const double step = (c.orthographic ? 1.0 : static_cast<double>(view.depth.at(x, y))) /
+                                std::min(c.fx, c.fy);
             if (step <= voxel * (1 + 1e-6)) continue;
             if (x + 1 == width || y + 1 == height || !hasPoint(view.depth.at(x + 1, y)) ||
                 !hasPoint(view.depth.at(x, y + 1)) || !hasPoint(view.depth.at(x + 1, y + 1)))

@@ -9,6 +9,10 @@ std::uint8_t byteFromUnit(float v) {
     return static_cast<std::uint8_t>(std::lround(std::clamp(v, 0.0f, 1.0f) * 255.0f));
 }
 
+std::string layerName(const std::string& first, std::size_t k) {
+    return k == 0 ? first : fmt::format("{}_{}", first, k);
+}
+
 /// The length of the lists of a PointTexture.
 struct Shape {
     std::size_t points = 0;
@@ -98,7 +102,7 @@ Result<std::vector<ReferenceView>> viewsFromPointTexture(const Node& node,
     std::vector<Rgba8Image> textures;
     for (std::int32_t k = 0; k < layers; ++k) {
         ReferenceView layer = view;
-        if (k > 0) layer.name += fmt::format("_{}", k);
+        layer.name = layerName(view.name, static_cast<std::size_t>(k));
         layer.depth = Image<float>(width, height, kNoDepth);
         textures.emplace_back(width, height);
         if (!normals.empty()) layer.normal = Image<glm::vec3>(width, height);
@@ -150,15 +154,18 @@ Result<std::vector<ReferenceView>> headersFromPointTexture(const Node& node,
     STX_TRY(const Shape shape, shapeOf(node, limits));
     std::vector<ReferenceView> views(static_cast<std::size_t>(shape.layers), view);
     for (std::size_t k = 0; k < views.size(); ++k) {
-        if (k > 0) views[k].name += fmt::format("_{}", k);
+        views[k].name = layerName(view.name, k);
         views[k].depthBits = shape.depthBits;
     }
     return views;
 }
 
-bool isLayerOf(const ReferenceView& view, const ReferenceView& first) {
-    return view.camera == first.camera && view.nearPlane == first.nearPlane &&
-           view.farPlane == first.farPlane && view.hasNormals() == first.hasNormals() &&
+bool isLayerOf(const ReferenceView& view, const ReferenceView& first, std::size_t k) {
+    return view.name == layerName(first.name, k) && view.camera == first.camera &&
+           view.nearPlane == first.nearPlane && view.farPlane == first.farPlane &&
+           view.depthBits == first.depthBits && view.noDepth == first.noDepth &&
+           view.pruned == first.pruned && view.background == first.background &&
+           view.refined == first.refined && view.hasNormals() == first.hasNormals() &&
            view.hasSplats() == first.hasSplats();
 }
 

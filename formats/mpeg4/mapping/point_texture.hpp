@@ -24,8 +24,10 @@ namespace stx::mpeg4 {
                                                                          const ReferenceView& view,
                                                                          const Limits& limits);
 
-/// Whether a view can be a further layer of one: camera and planes are the same.
-[[nodiscard]] bool isLayerOf(const ReferenceView& view, const ReferenceView& first);
+/// Whether a view can be layer `k` of one: all that is said of them is the same, but for its name,
+/// which is the one that viewsFromPointTexture() gives. Points of a pixel move to the first layers,
+/// so that nothing could be said of one layer alone.
+[[nodiscard]] bool isLayerOf(const ReferenceView& view, const ReferenceView& first, std::size_t k);
 
 /// A PointTexture (or V2, which has normals and splats in scene units) of layers that isLayerOf()
 /// holds for; codes of `bits` (8 or 16) with the planes of `code`. Coverage has no place in it.

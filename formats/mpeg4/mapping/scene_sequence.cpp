@@ -24,7 +24,7 @@ class SceneSequence : public Sequence {
         STX_TRY(timeline_, timelineOf(document_, images_, options_.timesFromStart, &job));
         // Of what stands still no picture is asked for twice.
         if (timeline_.moves()) images_.keepPictures(keptPictureBytes(job.limits));
-        STX_TRY(const auto scene, composeScene(document_.frames, document_.frames.front().time));
+        STX_TRY(const auto scene, sceneAtStart(document_, images_, options_.timesFromStart));
         start_ = ownClock(scene, job.limits).start;
         noteBrokenKeys(document_, job);
         // Once for all frames: it is what stands still.

@@ -226,6 +226,17 @@ class Moments {
 
 }  // namespace
 
+Result<Scene> sceneAtStart(const Document& document, StreamImages images, bool timesFromStart) {
+    const std::uint32_t timescale = document.sceneStream.timescale;
+    const std::uint64_t ticks = document.frames.front().time;
+    const double now = static_cast<double>(ticks) / timescale;
+    MovingScene moments(
+        document.frames, timescale, timesFromStart,
+        [&images](const Node& node, double time) { return isActive(node, images, time); });
+    STX_TRY(Scene * scene, moments.at(now, ticks, halfTick(1.0 / timescale, now)));
+    return std::move(*scene);
+}
+
 OwnClock ownClock(const Scene& scene, const Limits& limits) {
     OwnClock own;
     const auto shown = shownScene(scene.root, limits);
@@ -277,7 +288,7 @@ Result<Timeline> timelineOf(const Document& document, const StreamImages& images
         const double step = times[times.size() - 1] - times[times.size() - 2];
         line.end = end > times.back() ? end : times.back() + step;
     }
-    STX_TRY(const auto scene, composeScene(document.frames, document.frames.front().time));
+    STX_TRY(const auto scene, sceneAtStart(document, images, timesFromStart));
     const OwnClock own = ownClock(scene, images.limits());
     if (own.duration) line.end = std::max(times.back(), times.front() + *own.duration);
     line.findTick();

@@ -22,6 +22,12 @@ namespace stx::mpeg4 {
 [[nodiscard]] Result<Timeline> timelineOf(const Document& document, const StreamImages& images,
                                           bool timesFromStart = false, Job* job = nullptr);
 
+/// The scene at its first moment as a film has it: with what clocks send then. `images` are of the
+/// document; `timesFromStart`: as SceneReadOptions has it. Errors as composeScene(). The document
+/// must have a frame.
+[[nodiscard]] Result<Scene> sceneAtStart(const Document& document, StreamImages images,
+                                         bool timesFromStart);
+
 /// What a WorldInfo says of a film's own clock: when the presentation begins, and how long the film
 /// or the moment is, in seconds.
 struct OwnClock {

@@ -121,17 +121,11 @@ std::size_t StreamImages::sampleAt(const Node& texture, const ElementaryStream& 
 }
 
 const ElementaryStream* StreamImages::stream(const Node& texture) const {
-    const auto* urls = urlsOf(texture);
-    if (!urls) return nullptr;
-    for (const Url& url : *urls) {
-        const auto found = byId_.find(url.objectDescriptorId);
-        if (found != byId_.end() && !found->second->streams.empty())
-            return &found->second->streams[0];
-    }
-    return nullptr;
+    const auto source = sourceOf(texture);
+    return source ? source->stream : nullptr;
 }
 
-Result<Bytes> StreamImages::load(const Node& texture, const Limits& limits) const {
+Result<StreamImages::Source> StreamImages::sourceOf(const Node& texture) const {
     const auto* urls = urlsOf(texture);
     if (!urls)
         return fail(ErrorCode::unsupported,
@@ -142,54 +136,63 @@ Result<Bytes> StreamImages::load(const Node& texture, const Limits& limits) cons
         return fail(ErrorCode::invalidInput, "the {} has no url", texture.info->name);
     Error last;
     for (const Url& url : *urls) {
-        if (url.objectDescriptorId == 0) {
-            if (folder_.empty()) {
-                last = {ErrorCode::invalidInput,
-                        fmt::format("the url '{}' is not an object descriptor", excerpt(url.text)),
-                        {}};
-                continue;
-            }
-            auto path = resolveInside(folder_, url.text, limits);
-            if (!path) {
-                last = path.error();
-                continue;
-            }
-            return readFile(*path, limits);
+        if (url.objectDescriptorId != 0) {
+            auto stream = streamOf(url);
+            if (stream) return Source{&url, *stream};
+            last = std::move(stream.error());
+        } else {
+            auto file = fileOf(url);
+            if (file) return Source{&url, nullptr};
+            last = std::move(file.error());
         }
-        const auto found = byId_.find(url.objectDescriptorId);
-        if (found == byId_.end()) {
-            last = {
-                ErrorCode::invalidInput,
-                fmt::format("object descriptor {} is named, which the presentation does not have",
-                            url.objectDescriptorId),
-                {}};
-            continue;
-        }
-        const ObjectDescriptor& od = *found->second;
-        if (od.streams.empty() || od.streams[0].samples.empty()) {
-            last = {
-                ErrorCode::invalidInput,
-                fmt::format("object descriptor {} has no stream with an image in this file", od.id),
-                {}};
-            continue;
-        }
-        const Sample& sample = od.streams[0].samples[sampleAt(texture, od.streams[0])];
-        if (sample.data.size == 0) {
-            last = {ErrorCode::invalidInput,
-                    fmt::format("the image '{}' of object descriptor {} was not loaded",
-                                excerpt(od.streams[0].fileName), od.id),
-                    {}};
-            continue;
-        }
-        return sample.data.load(limits);
     }
     return tl::unexpected(last);
 }
 
+Result<const ElementaryStream*> StreamImages::streamOf(const Url& url) const {
+    const auto found = byId_.find(url.objectDescriptorId);
+    if (found == byId_.end())
+        return fail(ErrorCode::invalidInput,
+                    "object descriptor {} is named, which the presentation does not have",
+                    url.objectDescriptorId);
+    const ObjectDescriptor& od = *found->second;
+    if (od.streams.empty() || od.streams[0].samples.empty())
+        return fail(ErrorCode::invalidInput,
+                    "object descriptor {} has no stream with an image in this file", od.id);
+    const ElementaryStream& stream = od.streams[0];
+    // Of video only a decoder knows what a sample without bytes shows.
+    if (stream.samples[0].data.size == 0 && !isVideo(stream))
+        return fail(ErrorCode::invalidInput,
+                    "the image '{}' of object descriptor {} was not loaded",
+                    excerpt(stream.fileName), od.id);
+    return &stream;
+}
+
+Result<std::filesystem::path> StreamImages::fileOf(const Url& url) const {
+    if (folder_.empty())
+        return fail(ErrorCode::invalidInput, "the url '{}' is not an object descriptor",
+                    excerpt(url.text));
+    const std::lock_guard lock(files_->mutex);
+    const auto [entry, fresh] = files_->byText.try_emplace(url.text);
+    if (fresh) entry->second = resolveInside(folder_, url.text, limits_);
+    return entry->second;
+}
+
+Result<Bytes> StreamImages::bytesOf(const Node& texture, const Source& source,
+                                    const Limits& limits) const {
+    if (const ElementaryStream* stream = source.stream)
+        return stream->samples[sampleAt(texture, *stream)].data.load(limits);
+    STX_TRY(const auto file, fileOf(*source.url));
+    return readFile(file, limits);
+}
+
+Result<Bytes> StreamImages::load(const Node& texture, const Limits& limits) const {
+    STX_TRY(const auto source, sourceOf(texture));
+    return bytesOf(texture, source, limits);
+}
+
 Result<DecodedImage> StreamImages::decodeVideo(const ElementaryStream& stream, std::size_t sample,
                                                Samples samples, const Limits& limits) const {
-    if (stream.samples.empty())
-        return fail(ErrorCode::invalidInput, "its stream has no picture in this file");
     auto picture = video_->picture(stream, sample, limits);
     if (!picture && picture.error().code == ErrorCode::unsupported)
         return fail(ErrorCode::unsupported,
@@ -233,15 +236,16 @@ Result<DecodedImage> StreamImages::decode(const Node& texture, const ImageDecode
             return fail(ErrorCode::invalidInput, "the PixelTexture is empty");
         return decodedFromPixels(image);
     }
-    const ElementaryStream* from = stream(texture);
-    const PictureCache::Key key{from, from && !from->samples.empty() ? sampleAt(texture, *from) : 0,
+    STX_TRY(const auto source, sourceOf(texture));
+    const ElementaryStream* from = source.stream;
+    const PictureCache::Key key{from, from ? sampleAt(texture, *from) : 0,
                                 samples == Samples::codes};
     if (cache_ && from)
         if (auto kept = cache_->find(key)) return *kept;
     const auto read = [&]() -> Result<DecodedImage> {
         if (from && isVideo(*from)) return decodeVideo(*from, key.sample, samples, limits);
-        STX_TRY(const auto bytes, load(texture, limits));
-        const Url& url = urlsOf(texture)->front();
+        STX_TRY(const auto bytes, bytesOf(texture, source, limits));
+        const Url& url = *source.url;
         return decoder(bytes,
                        url.text.empty() ? fmt::format("od:{}", url.objectDescriptorId) : url.text,
                        limits);
@@ -256,17 +260,18 @@ Result<ImageInfo> StreamImages::probe(const Node& texture) const {
         const auto& image = texture.get<PixelImage>("image");
         return ImageInfo{"pixels", image.width, image.height, image.components, 8};
     }
-    // Which channels video has, only its decoder knows; its track tells its size.
-    if (const ElementaryStream* from = stream(texture); from && isVideo(*from) && from->width > 0)
-        return ImageInfo{"video", from->width, from->height, 1, lumaBits(*from) > 8 ? 16 : 8};
-    // Headers are at the front, but for a JPEG with much metadata.
-    if (const ElementaryStream* from = stream(texture); from && !from->samples.empty()) {
+    STX_TRY(const auto source, sourceOf(texture));
+    if (const ElementaryStream* from = source.stream) {
+        // Which channels video has, only its decoder knows; its track tells its size.
+        if (isVideo(*from) && from->width > 0)
+            return ImageInfo{"video", from->width, from->height, 1, lumaBits(*from) > 8 ? 16 : 8};
+        // Headers are at the front, but for a JPEG with much metadata.
         ByteRange head = from->samples[sampleAt(texture, *from)].data;
         head.size = std::min<std::uint64_t>(head.size, 1 << 16);
         STX_TRY(const auto bytes, head.load(limits_));
         if (auto info = probeImage(bytes)) return info;
     }
-    STX_TRY(const auto bytes, load(texture, limits_));
+    STX_TRY(const auto bytes, bytesOf(texture, source, limits_));
     return probeImage(bytes);
 }
 

@@ -2,6 +2,8 @@
 
 #include <filesystem>
 #include <memory>
+#include <mutex>
+#include <string>
 #include <unordered_map>
 
 #include "formats/mpeg4/mapping/mapping.hpp"
@@ -48,12 +50,23 @@ class StreamImages {
     /// PixelTexture; not of video and of what has no readable header.
     [[nodiscard]] bool probesAsDecoded(const Node& texture) const;
 
-    /// The stream behind the first URL that has one; null for files and PixelTexture.
+    /// The stream that load() takes its bytes from; null for files and PixelTexture.
     [[nodiscard]] const ElementaryStream* stream(const Node& texture) const;
     /// When its samples are shown; found once for each stream.
     [[nodiscard]] const Presentation& presentation(const ElementaryStream& stream) const;
 
   private:
+    /// Where the first usable URL leads: to a stream; to a file where that is null.
+    struct Source {
+        const Url* url = nullptr;
+        const ElementaryStream* stream = nullptr;
+    };
+    /// Errors as load(), but for those of reading.
+    [[nodiscard]] Result<Source> sourceOf(const Node& texture) const;
+    [[nodiscard]] Result<const ElementaryStream*> streamOf(const Url& url) const;
+    [[nodiscard]] Result<std::filesystem::path> fileOf(const Url& url) const;
+    [[nodiscard]] Result<Bytes> bytesOf(const Node& texture, const Source& source,
+                                        const Limits& limits) const;
     /// The sample that a texture shows at the moment. The stream must have one.
     [[nodiscard]] std::size_t sampleAt(const Node& texture, const ElementaryStream& stream) const;
     [[nodiscard]] Result<DecodedImage> decodeVideo(const ElementaryStream& stream,
@@ -65,6 +78,12 @@ class StreamImages {
     /// Shared by copies: they are of one document.
     std::shared_ptr<std::unordered_map<const ElementaryStream*, Presentation>> presentations_ =
         std::make_shared<std::unordered_map<const ElementaryStream*, Presentation>>();
+    /// What file each text of a URL means: each moment asks which stream a texture shows.
+    struct Files {
+        std::mutex mutex;
+        std::unordered_map<std::string, Result<std::filesystem::path>> byText;
+    };
+    std::shared_ptr<Files> files_ = std::make_shared<Files>();
     std::shared_ptr<PictureCache> cache_;
     std::shared_ptr<StreamVideo> video_ = std::make_shared<StreamVideo>();
     std::unordered_map<int, const ObjectDescriptor*> byId_;

@@ -47,7 +47,8 @@ ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
             bounds.add({n[3], n[4], n[5]});
             notes.bounds = bounds;
         } else if (line.starts_with("origin ")) {
-            if (const auto n = numbers(line, 3); !n.empty()) notes.origin = {n[0], n[1], n[2]};
+            if (const auto n = numbers(line, 3); !n.empty())
+                notes.origin = glm::dvec3(n[0], n[1], n[2]);
         } else if (line.starts_with("start ")) {
             if (const auto n = numbers(line, 1); !n.empty()) notes.start = n[0];
         } else if (line.starts_with("duration ")) {
@@ -99,8 +100,7 @@ std::vector<std::string> ViewNotes::text() const {
     if (bounds && !bounds->empty())
         info.push_back(fmt::format("bounds {} {} {} {} {} {}", bounds->min.x, bounds->min.y,
                                    bounds->min.z, bounds->max.x, bounds->max.y, bounds->max.z));
-    if (origin != glm::dvec3(0.0))
-        info.push_back(fmt::format("origin {} {} {}", origin.x, origin.y, origin.z));
+    if (origin) info.push_back(fmt::format("origin {} {} {}", origin->x, origin->y, origin->z));
     if (start) info.push_back(fmt::format("start {}", *start));
     if (duration) info.push_back(fmt::format("duration {}", *duration));
     if (count && !views.empty()) info.push_back(fmt::format("views {}", *count));

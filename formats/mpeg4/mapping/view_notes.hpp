@@ -20,7 +20,8 @@
 ///     "start seconds" (of the film's own clock, at the presentation's 0; see Timeline)
 ///     "duration seconds" (of a moment of a film that stands alone, see Bundle::duration; of a film
 ///     whose pictures and commands do not tell its end)
-///     "origin x y z" (added to all coordinates here, gives the world's; see Bundle::origin)
+///     "origin x y z" (added to all coordinates beside the WorldInfo, in its frame, gives the
+///     world's; see Bundle::origin)
 ///     "views count" (DepthImages, or pictures of an OctreeImage, beside the WorldInfo)
 ///     "name #N the view's own name"
 ///     "padding #N left top right bottom cx cy"
@@ -40,7 +41,7 @@ namespace stx::mpeg4 {
 
 struct ViewNotes {
     std::optional<Bounds> bounds;
-    glm::dvec3 origin{0.0};
+    std::optional<glm::dvec3> origin;
     std::optional<double> start, duration;
     std::optional<int> count;  ///< of the views that keys number
     struct Pad {

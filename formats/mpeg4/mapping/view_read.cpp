@@ -41,12 +41,15 @@ Result<ReferenceView> ViewReader::cameraOf(const ViewPlan& plan, int width, int 
     if (!isFieldOfView(fov, orthographic))
         return fail(ErrorCode::invalidInput, "fieldOfView is {} {}; {}", fov.x, fov.y,
                     fieldOfViewRule(orthographic));
-    view.nearPlane = node.get<float>("nearPlane");
-    view.farPlane = node.get<float>("farPlane");
-    if (!(view.nearPlane >= 0 && view.nearPlane < view.farPlane && std::isfinite(view.farPlane)))
-        return fail(ErrorCode::invalidInput,
-                    "nearPlane is {} and farPlane {}; 0 <= nearPlane < farPlane must hold",
-                    view.nearPlane, view.farPlane);
+    if (!plan.octree) {  // which gives planes, too
+        view.nearPlane = node.get<float>("nearPlane");
+        view.farPlane = node.get<float>("farPlane");
+        if (!(view.nearPlane >= 0 && view.nearPlane < view.farPlane &&
+              std::isfinite(view.farPlane)))
+            return fail(ErrorCode::invalidInput,
+                        "nearPlane is {} and farPlane {}; 0 <= nearPlane < farPlane must hold",
+                        view.nearPlane, view.farPlane);
+    }
     const glm::dvec4 turn = axisAngle(node.get<Rotation>("orientation"));
     const glm::dvec3 position(node.get<glm::vec3>("position"));
     for (const double v : {turn.x, turn.y, turn.z, turn.w, position.x, position.y, position.z})

@@ -151,6 +151,8 @@ Result<void> BtReader::readReplace(std::uint64_t time) {
         replace.routeId = id;
         STX_CHECK(takeWord("BY"));
         STX_TRY(replace.route, readRoute(""));
+        // So that later commands find it.
+        replace.route.id = id;
         addCommand(document_.frames, time, std::move(replace));
         return {};
     }

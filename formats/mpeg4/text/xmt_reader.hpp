@@ -274,6 +274,8 @@ class XmtReader : private TextReader {
             return failAt(where(node), ErrorCode::invalidInput,
                           "expected one <ROUTE> in <Replace atRoute>");
         STX_TRY(auto route, readRoute(children[0]));
+        // So that later commands find it.
+        route.id = id;
         addCommand(document_.frames, time, ReplaceRoute{id, std::move(route)});
         return {};
     }

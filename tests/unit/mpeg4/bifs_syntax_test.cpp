@@ -4,7 +4,7 @@
 
 #include "formats/mpeg4/bifs/bit_stream.hpp"
 #include "tests/same_scenes.hpp"
-#include "tests/unit/mpeg4/core_fixtures.hpp"
+#include "tests/unit/mpeg4/round_trips.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -249,6 +249,36 @@ TEST(BifsSyntax, WhatHasNoCodeIsNotWritten) {
     ASSERT_FALSE(bytes);
     EXPECT_NE(bytes.error().text().find("replace the node instead"), std::string::npos)
         << bytes.error().text();
+}
+
+/// What is said when a scene with a QuantizationParameter and a Transform is written.
+std::string roundingOf(const std::string& parameter, const std::string& transform) {
+    const Document document =
+        mustReadBt("Group { children [ QuantizationParameter { isLocal FALSE " + parameter +
+                   " } Transform { " + transform + " } ] }");
+    Job job;
+    EXPECT_TRUE(writeMp4(document, job));
+    const std::string notes = fmt::format("{}", fmt::join(job.takeNotes(), "|"));
+    // What was read back is on the codes.
+    EXPECT_TRUE(writeMp4(throughMp4(document), job));
+    EXPECT_TRUE(job.takeNotes().empty());
+    return notes;
+}
+
+TEST(Quantisation, SaysByHowMuchItRounds) {
+    const auto off = [](const char* most) {
+        return fmt::format("a QuantizationParameter rounds values of the scene: at most {} off",
+                           most);
+    };
+    const std::string places =
+        "position3DQuant TRUE position3DMin -10 -10 -10 position3DMax 10 10 10 position3DNbBits 4";
+    EXPECT_EQ(roundingOf(places, "translation 1.25 -10 10"), off("0.5833"));
+    EXPECT_EQ(roundingOf(places, "translation 10 -10 10"), "");
+    EXPECT_EQ(roundingOf("useEfficientCoding TRUE", "translation 1.25 0 -3"), "");
+    EXPECT_EQ(roundingOf("useEfficientCoding TRUE", "translation 1.0001 0 0"), off("3.898e-05"));
+    const std::string turns = "normalQuant TRUE normalNbBits 4";
+    EXPECT_EQ(roundingOf(turns, "rotation 0 1 0 1.5707964"), "");
+    EXPECT_EQ(roundingOf(turns, "rotation 0 1 0 0.1"), off("0.1"));
 }
 
 }  // namespace

@@ -98,6 +98,52 @@ TEST(StatedBounds, AreNotBelievedWhereViewsWereMovedWithoutThem) {
     EXPECT_NE(notes[0].find("bounds"), std::string::npos) << notes[0];
 }
 
+std::string withOrigin(const std::string& origin, const std::string& more = "") {
+    return "Group { children [ WorldInfo { info [\"origin " + origin + "\" " + more + "] } " +
+           depthImage(kSeesBounds) + " ] } ";
+}
+
+TEST(StatedOrigins, FollowTheTransformsAboveThem) {
+    const std::string object = withOrigin("1000 20 3");
+    EXPECT_EQ(mustRead(object).origin, glm::dvec3(1000, 20, 3));
+    const Bundle scaled =
+        mustRead("Transform { translation 10 0 0 scale 2 2 2 children [ " + object + " ] }");
+    expectNear(scaled.origin, {2000, 40, 6});
+    expectNear(scaled.views.at(0).camera.position, {13, 1, 18});
+    const Bundle turned =
+        mustRead("Transform { rotation 0 0 1 1.5707963268 children [ " + object + " ] }");
+    EXPECT_LT(glm::length(turned.origin - glm::dvec3(-20, 1000, 3)), 1e-3);
+}
+
+/// All count from the first: what is beside another is moved.
+TEST(StatedOrigins, OfTwoObjectsBecomeOne) {
+    const std::string bounds = "\"bounds 1 0 0 2 1 0.5\" ";
+    const Bundle two = mustRead(withOrigin("1000000 0 0", bounds) +
+                                withOrigin("1000100 5 0", bounds) + depthImage(kSeesBounds));
+    EXPECT_EQ(two.origin, glm::dvec3(1000000, 0, 0));
+    ASSERT_EQ(two.views.size(), 3u);
+    expectNear(two.views[0].camera.position, {1.5, 0.5, 9});
+    expectNear(two.views[1].camera.position, {101.5, 5.5, 9});
+    expectNear(two.views[2].camera.position, {1.5, 0.5, 9});
+    EXPECT_EQ(mustRead(withOrigin("0 0 0") + withOrigin("7 0 0")).origin, glm::dvec3(0.0));
+    const auto [both, notes] =
+        readWithNotes(withOrigin("1000000 0 0", bounds) + withOrigin("1000001 0 0", bounds), true);
+    ASSERT_TRUE(both.bounds) << notes.at(0);
+    expectNear(both.bounds->min, {1, 0, 0});
+    expectNear(both.bounds->max, {3, 1, 0.5});
+}
+
+TEST(StatedOrigins, ComeBackFromAnOctreeImage) {
+    Bundle bundle;
+    bundle.views = {makeView(9, 7, 16)};
+    bundle.origin = {500000.1, 4000000.7, 0.3};
+    SceneWriteOptions options;
+    options.octreeLevels = 3;
+    const Bundle back = bundleOf(sceneOf(bundle, options));
+    EXPECT_EQ(back.origin, bundle.origin);
+    EXPECT_TRUE(back.bounds);
+}
+
 Bundle headersOf(const std::string& nodes) {
     Job job;
     const auto document = readBt("Group { children [ " + nodes + " ] }", "test.bt", job);

@@ -1,5 +1,6 @@
 #include "formats/mpeg4/mapping/mapping.hpp"
 
+#include <functional>
 #include <random>
 
 #include "formats/mpeg4/mapping/octree.hpp"
@@ -391,6 +392,28 @@ TEST(PointTexture, IsWrittenWithItsLayers) {
             1e-6f);
 }
 
+TEST(PointTexture, HasLayersOfWhichAllIsTheSame) {
+    const auto nodesOf = [](const std::function<void(ReferenceView&)>& change) {
+        Bundle bundle;
+        bundle.views = {makeView(9, 7, 16), makeView(9, 7, 16)};
+        bundle.views[1].name = "view1_1";
+        change(bundle.views[1]);
+        SceneWriteOptions options;
+        options.pointTexture = true;
+        int count = 0;
+        forEachNode(sceneOf(bundle, options).frames,
+                    [&](const NodePtr& node) { count += node->is("PointTexture"); });
+        return count;
+    };
+    EXPECT_EQ(nodesOf([](ReferenceView&) {}), 1);
+    EXPECT_EQ(nodesOf([](ReferenceView& view) { view.name = "behind"; }), 2);
+    EXPECT_EQ(nodesOf([](ReferenceView& view) { view.depthBits = 8; }), 2);
+    EXPECT_EQ(nodesOf([](ReferenceView& view) { view.background = true; }), 2);
+    EXPECT_EQ(nodesOf([](ReferenceView& view) { view.noDepth = NoDepth::unknown; }), 2);
+    EXPECT_EQ(nodesOf([](ReferenceView& view) { view.pruned = true; }), 2);
+    EXPECT_EQ(nodesOf([](ReferenceView& view) { view.refined.steps = "noise"; }), 2);
+}
+
 TEST(PointTexture, ListsThatDoNotFitAreRefused) {
     const auto with = [](const std::string& fields) {
         return "DepthImage { diTexture PointTexture { " + fields + " } }";
@@ -488,6 +511,19 @@ TEST(OctreeImage, EveryPointLiesOnTheHullOfItsVoxels) {
             }
         }
     }
+}
+
+TEST(OctreeImage, PlanesOfItsImagesAreNotUsed) {
+    const auto octree = [](const std::string& planes) {
+        return "OctreeImage { octreeResolution 2 octree [1] images [ DepthImage { position 0 0 10 "
+               "fieldOfView 1 1 " +
+               planes +
+               " diTexture SimpleTexture { texture PixelTexture { image 2 2 3 1 2 3 4 } } } ] }";
+    };
+    const Bundle bundle = mustRead(octree("")), other = mustRead(octree("nearPlane 5 farPlane 5"));
+    ASSERT_EQ(other.views.size(), 1u);
+    EXPECT_EQ(other.views[0].nearPlane, bundle.views.at(0).nearPlane);
+    EXPECT_EQ(other.views[0].depth, bundle.views[0].depth);
 }
 
 TEST(OctreeImage, DamagedTreesAreRefused) {

@@ -180,10 +180,33 @@ TEST(OctreeWriting, VoxelsPastTheSilhouetteHaveTheColourOfTheObject) {
     }
 }
 
+/// Pixels that are wider than high, or higher than wide, by more than what tears a surface.
+TEST(OctreeWriting, PixelsOfAnyShapeLeaveNoHoles) {
+    for (const glm::ivec2 size : {glm::ivec2(32, 6), glm::ivec2(6, 32)}) {
+        for (const bool orthographic : {true, false}) {
+            ReferenceView view;
+            view.camera = Camera::fromFieldOfView({0, 0, 10}, glm::dquat(1, 0, 0, 0), {0.2, 0.2},
+                                                  orthographic, size.x, size.y);
+            view.nearPlane = 5;
+            view.farPlane = 15;
+            view.depth = Image<float>(size.x, size.y, 10.0f);
+            view.texture = Rgba8Image(size.x, size.y, glm::u8vec4(90, 80, 70, 255));
+            Bundle wall;
+            wall.views = {view};
+            const Bundle back = bundleOf(writtenAs(wall, 4));
+            ASSERT_EQ(back.views.size(), 1u);
+            const ReferenceView& seen = back.views[0];
+            EXPECT_EQ(seen.pointCount(), static_cast<std::int64_t>(seen.depth.count()))
+                << size.x << "x" << size.y << " " << orthographic;
+        }
+    }
+}
+
 TEST(OctreeWriting, SaysWhatIsLost) {
     Bundle bundle;
     bundle.views = {makeView(8, 6, 16, 1)};
     addVectors(bundle.views[0]);
+    bundle.views[0].background = true;
     SceneWriteOptions options;
     options.octreeLevels = 3;
     options.texture = SceneWriteOptions::Texture::jpeg;
@@ -191,7 +214,8 @@ TEST(OctreeWriting, SaysWhatIsLost) {
     ASSERT_TRUE(sceneFromBundle(bundle, options, job));
     std::string all;
     for (const std::string& note : job.takeNotes()) all += note + "\n";
-    for (const char* what : {"voxels of", "no normals and splats", "JPEG of quality 92"})
+    for (const char* what :
+         {"voxels of", "no normals and splats", "no background", "JPEG of quality 92"})
         EXPECT_NE(all.find(what), std::string::npos) << what << " is not in\n" << all;
 }
 

@@ -75,6 +75,24 @@ TEST(RouteCommands, ReachRoutesByAnyName) {
     expectReached(throughXmt(document));
 }
 
+TEST(RouteCommands, FindARouteThatWasReplaced) {
+    const Document document = mustReadBt(R"(
+DEF A Group { children [ DEF B PointLight { } DEF C TouchSensor { } ] }
+DEF R ROUTE C.isOver TO B.on
+AT 1000 { REPLACE ROUTE R BY C.isActive TO B.on }
+AT 2000 { REPLACE ROUTE R BY C.isOver TO B.on }
+AT 3000 { DELETE ROUTE R }
+)");
+    for (const Document& form : {document, throughXmt(document), throughMp4(document)}) {
+        const auto between = composeScene(form.frames, 2000), end = composeScene(form.frames);
+        ASSERT_TRUE(between && end);
+        ASSERT_EQ(between->routes.size(), 1u);
+        const Route& route = between->routes[0];
+        EXPECT_EQ(route.from->info->fields[route.fromField].name, "isOver");
+        EXPECT_TRUE(end->routes.empty());
+    }
+}
+
 TEST(RouteCommands, NameRoutesThatAreThere) {
     EXPECT_NE(
         btErrorOf("Group { } AT 1 { DELETE ROUTE Nowhere }").find("no ROUTE has the DEF name"),

@@ -6,6 +6,7 @@
 #include "formats/mpeg4/mapping/media_clock.hpp"
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/text/bt.hpp"
+#include "tests/temporary_folder.hpp"
 
 using namespace stx;
 using namespace stx::mpeg4;
@@ -76,9 +77,9 @@ DepthImage { orthographic FALSE position 0 0 0 diTexture SimpleTexture {
     return document;
 }
 
-std::unique_ptr<Sequence> opened(Document document) {
+std::unique_ptr<Sequence> opened(Document document, const SceneReadOptions& options = {}) {
     Job job;
-    auto sequence = sequenceFromScene(std::move(document), {}, job);
+    auto sequence = sequenceFromScene(std::move(document), options, job);
     if (!sequence) ADD_FAILURE() << sequence.error().text();
     return sequence ? std::move(*sequence) : nullptr;
 }
@@ -506,4 +507,52 @@ TEST(MediaClock, DwellsOnAPicture) {
         samples.push_back(shown.sampleAt(time, 1e-6));
     EXPECT_EQ(samples, (std::vector<std::size_t>{2, 2, 2, 2, 0, 1}));
     EXPECT_NEAR(shown.duration, 2, 1e-9);
+}
+
+TEST(SceneClocks, MoveTheMomentAtWhichAStillIsRead) {
+    for (const auto& [clock, x] : {std::pair{"cycleInterval 4", 0.0},
+                                   {"cycleInterval 4 startTime -2", 2.0},
+                                   {"cycleInterval 4 startTime -9", -1.0},
+                                   {"cycleInterval 4 startTime 1", -1.0}}) {
+        SCOPED_TRACE(clock);
+        const Document document = moved(clock);
+        expectPlaces(document, {{0, x}});
+        Job job;
+        const auto still = bundleFromScene(document, {}, job);
+        ASSERT_TRUE(still) << still.error().text();
+        EXPECT_NEAR(still->views.at(0).camera.position.x, x, 1e-5);
+        const auto table = viewsFromScene(std::make_shared<const Document>(document), {}, job);
+        ASSERT_TRUE(table) << table.error().text();
+        EXPECT_NEAR(std::as_const(**table).about().views.at(0).camera.position.x, x, 1e-5);
+    }
+}
+
+// A stream that several textures name behind files of their own is the picture of none of these.
+TEST(SceneStreams, StandBehindFilesThatAreNamedFirst) {
+    const TemporaryFolder folder;
+    for (const int grey : {40, 120}) {
+        const auto bytes =
+            pictures({static_cast<std::uint8_t>(grey)}).samples[0].data.load(Limits());
+        ASSERT_TRUE(bytes);
+        ASSERT_TRUE(writeFile(folder / fmt::format("{}.png", grey), *bytes));
+    }
+    std::string views;
+    for (const char* name : {"40", "none", "120"})
+        views += fmt::format(
+            "DepthImage {{ orthographic FALSE diTexture SimpleTexture {{ depth PixelTexture {{ "
+            "image 1 1 1 200 }} texture ImageTexture {{ url [\"{}.png\" od:10] }} }} }} ",
+            name);
+    Document document = readText("Group { children [ DEF T Transform { children [ " + views +
+                                 "] } ] } AT 1000 { REPLACE T.translation BY 1 0 0 }");
+    addStream(document, 0, pictures({200}));
+    SceneReadOptions options;
+    options.folder = folder.path();
+    const auto sequence = opened(std::move(document), options);
+    ASSERT_TRUE(sequence);
+    for (const double time : {0, 1, 0}) {
+        const Bundle frame = frameAt(*sequence, time);
+        ASSERT_EQ(frame.views.size(), 3u);
+        for (const auto& [view, grey] : {std::pair<std::size_t, int>{0, 40}, {1, 200}, {2, 120}})
+            EXPECT_EQ(frame.views[view].texture.rgba8()->at(0, 0).r, grey) << view;
+    }
 }

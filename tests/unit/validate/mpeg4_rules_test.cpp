@@ -338,6 +338,41 @@ TEST(Validate, ImagesOfAnOctreeImageAreDecoded) {
     EXPECT_EQ(numbersWith(document, false), Numbers{});
 }
 
+TEST(Validate, ImagesOfAnOctreeImageHaveATexture) {
+    const auto octree = [](const std::string& fields, const std::string& images) {
+        return numbersWith(
+            fromText("OctreeImage { octreeResolution 2 octree [255] images [ DepthImage { "
+                     "orthographic TRUE fieldOfView 1 1 position 0 0 2 " +
+                     fields + " diTexture SimpleTexture { " + images + " } } ] }"),
+            true);
+    };
+    const std::string texture = "texture PixelTexture { image 1 1 3 1 } ",
+                      depth = "depth PixelTexture { image 1 1 1 9 }";
+    EXPECT_EQ(octree("", depth), Numbers{4013});
+    EXPECT_EQ(octree("", texture + depth), Numbers{});
+    EXPECT_EQ(octree("nearPlane 5 farPlane 5", texture), Numbers{});
+}
+
+TEST(Validate, WhatClocksMoveIsReadAtEachMoment) {
+    const auto moved = [](const std::string& scales) {
+        Job job;
+        auto document =
+            readBt("Group { children [ DEF T Transform { children " + camera("") +
+                       " } DEF C TimeSensor { cycleInterval 0.08 } DEF P PositionInterpolator { "
+                       "key [0 1] keyValue [" +
+                       scales +
+                       "] } ] } ROUTE C.fraction_changed TO P.set_fraction ROUTE P.value_changed "
+                       "TO T.scale",
+                   "test.bt", job);
+        if (!document) ADD_FAILURE() << document.error().text();
+        return document ? std::move(*document) : Document();
+    };
+    EXPECT_EQ(numbersWith(moved("1 1 1 2 2 2"), true), Numbers{});
+    EXPECT_EQ(numbersWith(moved("1 1 1 1 2 1"), true), Numbers{2032});
+    // The first moment is as clocks have it, too.
+    EXPECT_EQ(numbersWith(moved("1 2 1 1 1 1"), true), Numbers{3006});
+}
+
 TEST(Validate, PicturesOfABackgroundAreDecoded) {
     Bundle bundle;
     bundle.views = {makeView(4, 4, 8)};
