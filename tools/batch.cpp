@@ -12,6 +12,7 @@
 #include <cstring>
 #include <map>
 #include <optional>
+#include <set>
 
 #include <nlohmann/json.hpp>
 
@@ -383,7 +384,7 @@ std::string_view withoutComment(std::string_view line) {
 }  // namespace
 
 Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs,
-                                              const Limits& limits) {
+                                              const Command& command, Program& program) {
     std::vector<std::string> names;
     for (const auto& input : inputs) {
         if (input.size() < 2 || input[0] != '@') {
@@ -391,7 +392,7 @@ Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& in
             continue;
         }
         const std::string list = input.substr(1);
-        STX_TRY(auto bytes, readFile(list, limits));
+        STX_TRY(auto bytes, readFile(list, program.job.limits));
         if (auto plain = utf8FromMarked(bytes)) bytes = std::move(*plain);
         const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
         const auto before = names.size();
@@ -411,29 +412,41 @@ Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& in
     if (names.empty())
         return fail(ErrorCode::usage,
                     "no input was given, or the list of inputs is empty; name at least one file");
+    if (auto good = command.checkNames(names); !good) {
+        // Nor is the mistake reported in the place of an input.
+        std::string& report = program.common.report;
+        if (!mayHoldReport(report, alikeAmong(names, {NamedPath{"--report", report}})))
+            report.clear();
+        return propagate(good);
+    }
     return names;
 }
 
 Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
-                                         const std::string& pattern) {
+                                         const std::string& pattern, const Command& command) {
     if (inputs.size() > 1 && !namesEach(pattern))
         return fail(ErrorCode::usage,
                     "{} inputs need an output name for each; write {{stem}} in -o, as in "
                     "'out/{{stem}}.mp4'",
                     inputs.size());
+    const std::set<std::string> read = command.namesRead(inputs);
     std::vector<BatchItem> items;
+    std::vector<NamedPath> outputs;  // that may be inputs
     std::map<std::string, std::string> inputOf;
+    std::error_code ec;
     for (const auto& input : inputs) {
         BatchItem item{input, outputOf(pattern, input), items.size()};
-        const auto key = fs::path(item.output).lexically_normal().string();
+        const auto key = fs::absolute(item.output, ec).lexically_normal().string();
         if (const auto [known, fresh] = inputOf.emplace(key, input); !fresh)
             return fail(
                 ErrorCode::usage,
                 "'{}' and '{}' would both be written to '{}'; put {{dir}} or {{parent}} into "
                 "-o, or rename one",
                 known->second, input, item.output);
+        if (read.contains(lastName(item.output))) outputs.push_back({"-o", item.output, input});
         items.push_back(std::move(item));
     }
+    STX_CHECK(command.checkNames(inputs, outputs));
     return items;
 }
 

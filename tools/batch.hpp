@@ -32,16 +32,19 @@ void addJobsOption(Command command, BatchOptions& options);
 /// Replaces `@list.txt` by the names in that file (`@-`: in stdin), one in each line, relative to
 /// the current folder; empty lines and what follows a # that begins a line or comes after a blank
 /// are passed over, but for names that exist with it. Errors: io;
-/// (invalidInput) a list without a name; (usage) no input at all.
+/// (invalidInput) a list without a name; (usage) no input at all, or an output of the command that
+/// would take the place of one.
 [[nodiscard]] Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs,
-                                                            const Limits& limits);
+                                                            const Command& command,
+                                                            Program& program);
 
 /// Names each input's output: in `pattern`, `{stem}` stands for the input's file name without its
 /// ending, `{dir}` for the folder it is in as given ("." for a bare name), `{parent}` for that
 /// folder's own name. Errors (usage): several inputs and none of these, two inputs with the same
-/// output.
+/// output, an output that would take the place of another one's input.
 [[nodiscard]] Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
-                                                       const std::string& pattern);
+                                                       const std::string& pattern,
+                                                       const Command& command);
 
 /// What a report says of an item that was done, or skipped ("skipped").
 [[nodiscard]] nlohmann::ordered_json entryOf(const BatchItem& item, const char* status);

@@ -6,6 +6,7 @@
 #include "formats/any/open.hpp"
 #include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
@@ -139,8 +140,7 @@ bool holdsVideo(const std::string& input, const Job& job) {
 
 /// Whether one bundle becomes another, and not frames a picture.
 bool isBundle(const BackgroundOptions& o) {
-    const std::string ending = std::filesystem::path(o.output).extension().string();
-    if (o.inputs.size() != 1 || (ending != ".exr" && ending != ".EXR")) return false;
+    if (o.inputs.size() != 1 || lowerExtension(o.output) != ".exr") return false;
     const auto kind = recognise(o.inputs[0]);
     return kind && (*kind == FileKind::mpeg4 || *kind == FileKind::exr ||
                     *kind == FileKind::atlas || *kind == FileKind::photo);

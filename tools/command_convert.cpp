@@ -192,13 +192,16 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
             changedOnTheWay(std::move(frames), target, [imported, &o](Bundle& bundle, Job& job) {
                 return o.refining.refine(bundle, *imported, job);
             });
+    CodedDepth codes;
     if (const auto bits = o.mesh->depthBits) {
-        ViewChange change;
-        change.header = [bits = *bits](ViewHeader& header) { header.depthBits = bits; };
-        change.change = [set = change.header](ReferenceView& view, Job&) -> Result<void> {
-            set(view);
-            return {};
-        };
+        ViewChange change = withDepthBits(*bits, codes);
+        STX_TRY(const auto container, containerOf(target));
+        // MPEG-4 has one range for all frames of a view, and rounds to it itself.
+        if (container == FileKind::mpeg4)
+            change.change = [set = change.header](ReferenceView& view, Job&) -> Result<void> {
+                set(view);
+                return {};
+            };
         frames = changedByView(std::move(frames), std::move(change));
     }
     if (o.environment.given()) {
@@ -212,6 +215,7 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
     frames = tallied(std::move(frames), tally);
     keepFreedMemory();  // of a view, for the next one
     STX_CHECK(saveSequence(*frames, target, saveOptions(o, program), program.job));
+    codes.note(program.job);
     done.views = tally.views();
     done.sizes = tally.sizes();
     if (countPoints) done.points = tally.points();
@@ -324,6 +328,8 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
 
 Result<int> convert(const ConvertOptions& options, const Command& command, Program& program) {
     ConvertOptions o = options;
+    STX_TRY(const auto inputs, expandInputs(o.inputs, command, program));
+    o.batch.shard.addInputs(inputs);
     o.givenOfMeshes = command.givenUnder(MeshViewOptions::kHeading);
     o.givenOfSets = command.givenUnder(kSetHeading);
     if (o.still && o.moving)
@@ -355,8 +361,7 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
         program.sayNotes();
         return convertFrames(o, program);
     }
-    STX_TRY(const auto inputs, expandInputs(o.inputs, program.job.limits));
-    STX_TRY(const auto items, planBatch(inputs, o.output));
+    STX_TRY(const auto items, planBatch(inputs, o.output, command));
     STX_CHECK(checkMeshViewOptions(*o.mesh, command, program));
     if (items.size() > 1) STX_CHECK(command.refuse({"--plot"}, "is of one input"));
     STX_CHECK(containerOf(items[0].output));

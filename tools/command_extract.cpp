@@ -122,15 +122,14 @@ struct Wanted {
 /// What the options ask for; puts the name of a folder right. Errors (usage): those of
 /// folderTarget() and extractedAs().
 Result<Wanted> wantedOf(ExtractOptions& o) {
-    const std::string given = o.output;
-    STX_TRY(o.output,
-            folderTarget(given, {".glb", ".html", ".ply", ".drc", ".spz", ".png", ".jpg", ".jpeg"},
-                         "a folder, .glb, .html, .ply, .spz, .drc, .png or .jpg"));
-    std::error_code ec;
-    const bool plain = o.output == given && !std::filesystem::is_directory(o.output, ec);
+    STX_TRY(
+        const auto target,
+        folderTarget(o.output, {".glb", ".html", ".ply", ".drc", ".spz", ".png", ".jpg", ".jpeg"},
+                     "a folder, .glb, .html, .ply, .spz, .drc, .png or .jpg"));
+    o.output = target.path;
     Wanted w;
-    STX_TRY(w.as, extractedAs(o.as, plain ? o.output : ""));
-    if (plain) w.ending = lowerExtension(o.output);
+    STX_TRY(w.as, extractedAs(o.as, target.folder ? "" : o.output));
+    if (!target.folder) w.ending = lowerExtension(o.output);
     w.splats = w.as == ExtractAs::splats;
     w.points = w.as == ExtractAs::points;
     w.picture = w.as == ExtractAs::rgbd || w.as == ExtractAs::pair;

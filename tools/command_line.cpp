@@ -98,22 +98,41 @@ Error unknownCommand(const std::string& name, const std::vector<std::string>& kn
 }
 
 /// What an option names; of a list, @LIST, its file.
-void addNamedPaths(const CLI::Option& option, bool replaces, std::vector<NamedPath>& to) {
+void addNamedPaths(const CLI::Option& option, const std::string& replaces,
+                   std::vector<NamedPath>& to) {
     if (option.count() == 0) return;
     const std::string name = option.get_positional() ? "" : optionRow(option).names.front();
     for (const std::string& text : option.reduced_results())
         to.push_back({name, text.substr(text.starts_with('@') ? 1 : 0), replaces});
 }
 
-Result<void> checkPaths(const CLI::App& app, const PathOptions& paths) {
-    std::vector<NamedPath> inputs, outputs;
+/// The inputs that stand alone.
+std::vector<NamedPath> positionalsOf(const CLI::App& app) {
+    std::vector<NamedPath> inputs;
     for (const CLI::Option* option : app.get_options([](const CLI::Option* o) {
              return o->get_positional() && optionRow(*o).choices.empty();
          }))
-        addNamedPaths(*option, false, inputs);
-    for (const auto* option : paths.inputs) addNamedPaths(*option, false, inputs);
+        addNamedPaths(*option, "", inputs);
+    return inputs;
+}
+
+/// What the options of a command name for reading.
+void addInputsOf(const PathOptions& paths, std::vector<NamedPath>& to) {
+    for (const auto* option : paths.inputs) addNamedPaths(*option, "", to);
+}
+
+/// What the options of a command name for writing, but for `named`, if it is not null. `only`: what
+/// may be replaced.
+std::vector<NamedPath> outputsOf(const PathOptions& paths, const std::string& only,
+                                 const CLI::Option* named = nullptr) {
+    std::vector<NamedPath> outputs;
     for (const auto* option : paths.outputs)
-        addNamedPaths(*option, option == paths.replacing, outputs);
+        if (option != named) addNamedPaths(*option, option == paths.replacing ? only : "", outputs);
+    return outputs;
+}
+
+Result<void> checkPaths(const std::vector<NamedPath>& inputs,
+                        const std::vector<NamedPath>& outputs) {
     STX_CHECK(checkOutputNames(outputs, inputs));
     rememberNumberedInputs(inputs);
     for (const NamedPath& output : outputs) {
@@ -343,6 +362,7 @@ std::string Command::jobOf(const std::vector<std::string>& without) const {
     }
     return fmt::format("{:016x}", hashOf(std::as_bytes(std::span(all))));
 }
+
 std::vector<std::string> Command::givenUnder(const std::string& heading) const {
     std::vector<std::string> found;
     for (const auto* option : std::as_const(*app_).get_options())
@@ -355,6 +375,25 @@ Result<void> Command::refuse(const std::vector<std::string>& names, const std::s
     if (const auto found = given(names); !found.empty())
         return fail(ErrorCode::usage, "{} {}", found.front(), why);
     return {};
+}
+
+std::set<std::string> Command::namesRead(const std::vector<std::string>& inputs) const {
+    std::vector<NamedPath> named;
+    addInputsOf(*paths_, named);
+    std::set<std::string> names;
+    for (const NamedPath& input : named) names.insert(lastName(input.path));
+    for (const std::string& input : inputs) names.insert(lastName(input));
+    return names;
+}
+
+Result<void> Command::checkNames(const std::vector<std::string>& inputs,
+                                 const std::vector<NamedPath>& outputs) const {
+    auto all = outputsOf(*paths_, inputs.size() == 1 ? inputs.front() : "",
+                         outputs.empty() ? nullptr : paths_->replacing);
+    all.insert(all.end(), outputs.begin(), outputs.end());
+    auto read = alikeAmong(inputs, all);
+    addInputsOf(*paths_, read);
+    return checkPaths(read, all);
 }
 
 CommandLine::CommandLine()
@@ -396,7 +435,10 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
     }
     for (const auto& entry : entries_) {
         if (!entry.app->parsed()) continue;
-        STX_CHECK(checkPaths(*entry.app, entry.paths));
+        auto inputs = positionalsOf(*entry.app);
+        const std::string only = inputs.size() == 1 ? inputs.front().path : "";
+        addInputsOf(entry.paths, inputs);
+        STX_CHECK(checkPaths(inputs, outputsOf(entry.paths, only)));
         return Request{{}, entry.body, entry.app->get_name()};
     }
     return fail(ErrorCode::usage, "no command was given. See 'stx --help'.");
@@ -442,9 +484,7 @@ CommandLine::FailedRequest CommandLine::failedRequest(int argc, char** argv) con
             request.report = words[++i];
     }
     const auto others = othersOf(words);
-    if (!checkReportName(request.report) || !checkReportIsNoMainFile(request.report, others) ||
-        std::ranges::any_of(others, [&](auto& o) { return samePath(o.path, request.report); }))
-        request.report = {};
+    if (!mayHoldReport(request.report, others)) request.report = {};
     return request;
 }
 

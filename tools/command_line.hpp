@@ -6,11 +6,13 @@
 #include <initializer_list>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "lib/base/result.hpp"
+#include "tools/output_names.hpp"
 
 namespace CLI {
 class App;
@@ -130,6 +132,13 @@ class Command {
     /// name: "is of lighting; give --light, too".
     [[nodiscard]] Result<void> refuse(const std::vector<std::string>& names,
                                       const std::string& why) const;
+    /// The last names of all that it reads: of `inputs`, and of what options name.
+    [[nodiscard]] std::set<std::string> namesRead(const std::vector<std::string>& inputs) const;
+    /// What CommandLine::parse() checks of outputs, again with what lists and patterns stand for:
+    /// `inputs` (alikeAmong()) for those that stand alone, `outputs`, if there are some, for the
+    /// output that may take an input's place.
+    [[nodiscard]] Result<void> checkNames(const std::vector<std::string>& inputs,
+                                          const std::vector<NamedPath>& outputs = {}) const;
 
   private:
     Option added(CLI::Option* option, bool lastCounts) const;

@@ -40,7 +40,13 @@ struct PackOptions {
     int period = 25;  ///< as the groups of pictures of video
     std::string colour = "png";
     std::optional<int> quality;
+    AtlasSaveOptions save;
 };
+
+/// How an input is opened for what is written.
+OpenOptions openOptions(const PackOptions& o) {
+    return o.save.folder ? o.open : o.open.into(o.output);
+}
 
 /// "4M", "250k" or "1000000" pixels.
 Result<std::int64_t> parsePixels(const std::string& text) {
@@ -102,13 +108,6 @@ Result<PruneReport> pruneOne(Bundle& bundle, const PackOptions& o, const std::st
                                 : prune(bundle, o.pruning, job));
 }
 
-AtlasSaveOptions saveOptions(const PackOptions& o, const Program& program) {
-    AtlasSaveOptions save;
-    save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(kJpegQuality) : 0;
-    save.output = program.outputOptions();
-    return save;
-}
-
 /// "12 views in 4 textures 2048x1024, 81.2 % used".
 std::string summaryOf(const Atlas& atlas) {
     return fmt::format("{} in {} {}x{}, {:.1f} % used", counted(atlas.views.size(), "view"),
@@ -144,30 +143,41 @@ struct PrunedTo {
     }
 };
 
+/// An atlas that was written, for its line and the report.
+struct Packed {
+    std::string output, text;
+    double seconds = 0;
+    nlohmann::ordered_json report;
+};
+
 /// Views into one atlas.
-Result<int> packViews(const PackOptions& o, std::unique_ptr<ViewTable> views, PackSettings settings,
-                      const std::optional<PrunedTo>& pruned, const Stopwatch& watch,
-                      Program& program) {
+Result<Packed> packViews(const PackOptions& o, std::unique_ptr<ViewTable> views,
+                         PackSettings settings, const std::optional<PrunedTo>& pruned,
+                         const Stopwatch& watch, Job& job) {
     if (pruned) settings.sourcePixels = pruned->report.sourcePixels;
-    const AtlasSaveOptions save = saveOptions(o, program);
     STX_TRY(auto atlas, within(fmt::format("'{}'", o.input),
-                               packForFile(*views, settings, o.output, save, program.job)));
+                               packForFile(*views, settings, o.output, o.save, job)));
     views.reset();
-    STX_CHECK(program.job.checkCancelled());
-    const std::string summary = summaryOf(atlas);
-    nlohmann::ordered_json report = {
+    STX_CHECK(job.checkCancelled());
+    Packed packed{o.output, summaryOf(atlas) + (pruned ? pruned->text() : ""), 0, {}};
+    packed.report = {
         {"$schema", "pack-report.schema.json"}, {"input", o.input}, {"output", o.output}};
-    addReportOf(atlas, 0, report);
-    STX_CHECK(writeAtlas(std::move(atlas), o.output, program.job, save));
-    const double seconds = watch.seconds();
-    report["seconds"] = seconds;
+    addReportOf(atlas, 0, packed.report);
+    STX_CHECK(writeAtlas(std::move(atlas), o.output, job, o.save));
+    packed.report["seconds"] = packed.seconds = watch.seconds();
+    return packed;
+}
+
+/// The notes, a line for each atlas, and of one alone the report.
+Result<void> tell(const PackOptions& o, const std::vector<Packed>& atlases, Program& program) {
     program.sayNotes();
-    program.say(fmt::format("{} ({}) → {} ({}), {}{}, {}",
-                            std::filesystem::path(o.input).filename().string(),
-                            humanBytes(bytesOf(o.input)), o.output, humanBytes(bytesOf(o.output)),
-                            summary, pruned ? pruned->text() : "", humanSeconds(seconds)));
-    STX_CHECK(program.writeReport(report));
-    return 0;
+    const std::string input =
+        fmt::format("{} ({})", std::filesystem::path(o.input).filename().string(),
+                    humanBytes(bytesOf(o.input)));
+    for (const Packed& p : atlases)
+        program.say(fmt::format("{} → {} ({}), {}, {}", input, p.output,
+                                humanBytes(bytesOf(p.output)), p.text, humanSeconds(p.seconds)));
+    return atlases.size() == 1 ? program.writeReport(atlases.front().report) : Result<void>();
 }
 
 /// What pruning as it is asked for keeps of views.
@@ -204,12 +214,13 @@ Result<int> packMoment(const PackOptions& o, Sequence& frames, std::size_t momen
     STX_TRY(auto views, frames.views(moment, program.job));
     const Stopwatch watch;
     STX_TRY(const auto pruned, pruneViews(o, o.input, views, program.job));
-    return packViews(o, std::move(views), o.settings, pruned, watch, program);
+    STX_TRY(auto packed, packViews(o, std::move(views), o.settings, pruned, watch, program.job));
+    STX_CHECK(tell(o, {std::move(packed)}, program));
+    return 0;
 }
 
 /// A frame of a film into one atlas, like the others of its period.
-Result<int> packFrame(const PackOptions& o, Bundle frame, const PackPeriod* period,
-                      Program& program) {
+Result<Packed> packFrame(const PackOptions& o, Bundle frame, const PackPeriod* period, Job& job) {
     const Stopwatch watch;
     PackSettings settings = o.settings;
     Bundle content;
@@ -219,12 +230,13 @@ Result<int> packFrame(const PackOptions& o, Bundle frame, const PackPeriod* peri
         settings.contentOf = &content;
         if (prunes(o)) pruned = PrunedTo{period->prune(frame)};
     }
-    return packViews(o, viewsOf(frame), settings, pruned, watch, program);
+    return packViews(o, viewsOf(frame), settings, pruned, watch, job);
 }
 
-/// Frames from `begin` to before `end`, an atlas each, all with the same rectangles.
+/// Frames from `begin` to before `end`, an atlas each, all with the same rectangles. Adds them to
+/// `atlases`.
 Result<void> packPeriod(const PackOptions& o, Sequence& frames, std::size_t begin, std::size_t end,
-                        Program& program) {
+                        std::vector<Packed>& atlases, Program& program) {
     const auto targetOf = [&](std::size_t i) { return *frameName(o.output, static_cast<int>(i)); };
     std::optional<PackPeriod> period;
     // Equal cells in the order of the views are the same without a look at the frames.
@@ -250,12 +262,31 @@ Result<void> packPeriod(const PackOptions& o, Sequence& frames, std::size_t begi
         PackOptions one = o;
         one.output = targetOf(i);
         STX_CHECK(checkTarget(one.output, program));
+        program.job.progress(static_cast<std::int64_t>(i),
+                             static_cast<std::int64_t>(frames.timeline().count()),
+                             "writing frames");
         STX_TRY(auto frame, frames.frame(i, program.job));
-        STX_TRY(const int done,
-                packFrame(one, std::move(frame), period ? &*period : nullptr, program));
-        if (done != 0) return fail(ErrorCode::failed, "'{}' was not packed", one.output);
+        STX_TRY(auto packed,
+                packFrame(one, std::move(frame), period ? &*period : nullptr, program.job));
+        atlases.push_back(std::move(packed));
     }
     return {};
+}
+
+/// An atlas for each frame. They appear when all are there, or none does.
+Result<int> packFilm(const PackOptions& options, Sequence& frames, Program& program) {
+    PackOptions o = options;
+    OutputFiles files;
+    o.save.output.together = &files;
+    std::vector<Packed> atlases;
+    const std::size_t count = frames.timeline().count();
+    const auto length = static_cast<std::size_t>(o.period);
+    for (std::size_t i = 0; i < count; i += length)
+        STX_CHECK(packPeriod(o, frames, i, std::min(count, i + length), atlases, program));
+    STX_CHECK(files.commit());
+    STX_CHECK(tell(o, atlases, program));
+    noteOlderFiles(o.output, count, program.job);
+    return 0;
 }
 
 /// The name of the object that an input becomes: its file's without the ending.
@@ -288,7 +319,7 @@ Result<std::vector<std::string>> objectNames(const PackOptions& o) {
 Result<PackTable> openObject(const PackOptions& o, const std::string& input,
                              const std::string& name, std::unique_ptr<Sequence>& frames, Job& job) {
     preloadCodecs(input);
-    STX_TRY(frames, openSequence(input, o.open.into(o.output), job));
+    STX_TRY(frames, openSequence(input, openOptions(o), job));
     STX_TRY(frames, refined(std::move(frames), o.refine, kPacking, folderOf(o.output)));
     const Timeline timeline = frames->timeline();
     std::size_t moment = 0;
@@ -357,8 +388,7 @@ Result<int> packSheet(const PackOptions& o, const Command& command, Program& pro
     STX_TRY(auto joined, joinTables(std::move(objects), program.job));
     PackSettings settings = o.settings;
     settings.objects = &joined.objects;
-    const AtlasSaveOptions save = saveOptions(o, program);
-    STX_TRY(auto atlas, packForFile(*joined.views, settings, o.output, save, program.job));
+    STX_TRY(auto atlas, packForFile(*joined.views, settings, o.output, o.save, program.job));
     joined.views.reset();
     STX_CHECK(program.job.checkCancelled());
     const std::string summary = summaryOf(atlas);
@@ -366,7 +396,7 @@ Result<int> packSheet(const PackOptions& o, const Command& command, Program& pro
         {"$schema", "pack-report.schema.json"}, {"inputs", o.inputs}, {"output", o.output}};
     addReportOf(atlas, 0, report);
     addObjectsOf(atlas, report);
-    STX_CHECK(writeAtlas(std::move(atlas), o.output, program.job, save));
+    STX_CHECK(writeAtlas(std::move(atlas), o.output, program.job, o.save));
     const double seconds = watch.seconds();
     report["seconds"] = seconds;
     program.sayNotes();
@@ -380,18 +410,21 @@ Result<int> packSheet(const PackOptions& o, const Command& command, Program& pro
 /// An atlas holds one moment: that of --time, or one atlas for each frame.
 Result<int> packInput(const PackOptions& options, const Command& command, Program& program) {
     PackOptions o = options;
-    STX_TRY(o.output, folderTarget(options.output, {".exr"}, "a folder or .exr"));
+    STX_TRY(o.inputs, expandInputs(options.inputs, command, program));
+    STX_TRY(const auto target, folderTarget(options.output, {".exr"}, "a folder or .exr"));
+    o.output = target.path;
     if (o.quality && o.colour != "jpeg")
         return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
     STX_CHECK(setSize(o.size, program.job.limits, o.settings));
     STX_CHECK(checkTarget(o.output, program));
-    o.settings.bytesToWrite = bytesToWriteAtlas(o.output);
+    o.save = {o.colour == "jpeg" ? o.quality.value_or(kJpegQuality) : 0, target.folder,
+              program.outputOptions()};
+    o.settings.bytesToWrite = bytesToWriteAtlas(o.output, o.save);
     if (!o.budget.empty()) STX_SET(o.pruning.budget, parsePixels(o.budget));
-    STX_TRY(o.inputs, expandInputs(options.inputs, program.job.limits));
     if (o.inputs.size() > 1 || !o.names.empty()) return packSheet(o, command, program);
     o.input = o.inputs.front();
     preloadCodecs(o.input);
-    STX_TRY(auto frames, openSequence(o.input, o.open.into(o.output), program.job));
+    STX_TRY(auto frames, openSequence(o.input, openOptions(o), program.job));
     // One atlas for each frame is made in two passes.
     const bool twice = frames->timeline().moves() && !o.time;
     STX_TRY(frames, (twice ? refinedOnce : refined)(std::move(frames), o.refine, kPacking,
@@ -421,11 +454,7 @@ Result<int> packInput(const PackOptions& options, const Command& command, Progra
         program.job.note(fmt::format("{} is met by each frame; what one of {} keeps, all keep",
                                      o.budget.empty() ? "--min-psnr" : "--budget",
                                      counted(o.period, "frame")));
-    const auto length = static_cast<std::size_t>(o.period);
-    for (std::size_t i = 0; i < count; i += length)
-        STX_CHECK(packPeriod(o, *frames, i, std::min(count, i + length), program));
-    noteOlderFiles(o.output, count, program.job);
-    return 0;
+    return packFilm(o, *frames, program);
 }
 
 }  // namespace

@@ -102,9 +102,10 @@ Result<int> makePanorama(const PanoramaOptions& options, const Command& command,
     if (!o.into.empty()) {
         STX_CHECK(containerOf(o.output));
     } else if (format == PanoramaFormat::folder) {
-        STX_TRY(o.output,
+        STX_TRY(const auto target,
                 folderTarget(options.output, {},
                              "a folder, .png, .jpg, .tif, .webp, .exr, .mp4, .bt or .xmt"));
+        o.output = target.path;
         // Now, not when minutes of work are done.
         if (const auto ending = std::filesystem::path(o.output).extension().string();
             !ending.empty())

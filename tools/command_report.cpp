@@ -28,11 +28,11 @@ Result<std::string> listOfRest(const MergedReport& merged, const std::vector<std
     return text;
 }
 
-Result<int> report(const ReportOptions& o, Program& program) {
+Result<int> report(const ReportOptions& o, const Command& command, Program& program) {
     for (const auto& target : {o.output, o.missing, o.outputs})
         if (!target.empty()) STX_CHECK(checkTarget(target, program));
     std::vector<std::string> names;
-    if (!o.inputs.empty()) STX_SET(names, expandInputs(o.inputs, program.job.limits));
+    if (!o.inputs.empty()) STX_SET(names, expandInputs(o.inputs, command, program));
     if (!o.missing.empty() && names.empty())
         return fail(ErrorCode::usage,
                     "--missing needs the names of all inputs; give --inputs "
@@ -117,7 +117,7 @@ void addReport(CommandLine& line, Program& program) {
         .writes("FILE");
     c.flag("--no-clobber", program.common.noClobber, "Refuse to replace existing files");
     c.sharedOptions(program.common, kFormat);
-    c.runs([o](Program& p) { return report(*o, p); });
+    c.runs([o, c](Program& p) { return report(*o, c, p); });
 }
 
 }  // namespace stx::tools

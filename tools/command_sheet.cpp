@@ -25,6 +25,7 @@ struct SheetOptions {
     std::vector<std::string> inputs;
     std::string output, size;
     std::string refine = "auto";
+    std::vector<std::string> refines;  ///< --refine, where it asks for something
     SheetSettings settings;
     OpenOptions open;
 };
@@ -127,6 +128,7 @@ Result<Sheet> sheetOfPair(const SheetOptions& o, Job& job) {
                     "'{}' is a picture and '{}' is not; two pictures or two bundles can be "
                     "compared",
                     o.inputs[first ? 0 : 1], o.inputs[first ? 1 : 0]);
+    job.noteUnused(o.refines, "of one input", "two are compared as they are");
     STX_TRY(const auto pairs, first ? pairsOfPictures(o, job) : pairsOfViews(o, job));
     return sheetOf(pairs, o.settings, job);
 }
@@ -141,6 +143,7 @@ Result<Sheet> sheetOfOne(const SheetOptions& o, Job& job) {
                     "compares two pictures",
                     input);
     if (kind == FileKind::atlas) {
+        job.noteUnused(o.refines, "of views", fmt::format("'{}' is shown as it is", input));
         // Of all objects, or of one.
         STX_TRY(const auto atlas,
                 o.open.object.empty() ? readAtlas(input, job) : openAtlas(input, o.open, job));
@@ -154,9 +157,11 @@ Result<Sheet> sheetOfOne(const SheetOptions& o, Job& job) {
     return sheetOf(*table, o.settings, job);
 }
 
-Result<int> sheet(const SheetOptions& options, Program& program) {
+Result<int> sheet(const SheetOptions& options, const Command& command, Program& program) {
     const Stopwatch watch;
     SheetOptions o = options;
+    STX_TRY(const auto refine, refineSettings(o.refine));
+    if (refine.any()) o.refines = command.given({"--refine"});
     if (o.inputs.size() > 2)
         return fail(ErrorCode::usage, "{} inputs; one, or two to compare, are expected",
                     o.inputs.size());
@@ -219,7 +224,7 @@ void addSheet(CommandLine& line, Program& program) {
     refineOption(c, o->refine);
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
-    c.runs([o](Program& p) { return sheet(*o, p); });
+    c.runs([o, c](Program& p) { return sheet(*o, c, p); });
 }
 
 }  // namespace stx::tools

@@ -76,12 +76,13 @@ void printEntry(const Json& entry, bool named, Program& program) {
         program.printJson(document);
 }
 
-Result<int> run(const ValidateCommandOptions& options, Program& program) {
+Result<int> run(const ValidateCommandOptions& options, const Command& command, Program& program) {
     ValidateCommandOptions o = options;
     if (o.rules) return printRules(program);
     if (o.inputs.empty())
         return fail(ErrorCode::usage, "FILE is required. See 'stx validate --help'");
-    STX_TRY(const auto inputs, expandInputs(o.inputs, program.job.limits));
+    STX_TRY(const auto inputs, expandInputs(o.inputs, command, program));
+    o.batch.shard.addInputs(inputs);
     if (inputs.size() == 1 && o.inputs[0][0] != '@' && !o.batch.shard.given) {
         STX_TRY(auto entry, validateOne(inputs[0], o, program));
         printEntry(entry, false, program);
@@ -133,7 +134,7 @@ void addValidate(CommandLine& line, Program& program) {
     addJobsOption(many, o->batch);
     addShardOption(many, o->batch.shard, "inputs");
     c.sharedOptions(program.common, kOutput | kFormat | kOutside);
-    c.runs([o](Program& p) { return run(*o, p); });
+    c.runs([o, c](Program& p) { return run(*o, c, p); });
 }
 
 }  // namespace stx::tools

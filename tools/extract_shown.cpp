@@ -29,7 +29,21 @@ struct Shown {
     std::int64_t points = 0;
 };
 
-/// A page for browsers, of an atlas' own textures where it is one.
+/// Whether a page shows an input as it is in an atlas: one of which nothing is to be refined.
+Result<bool> showsItsTextures(const std::string& input, const OpenOptions& open,
+                              const RefineSettings& settings, Job& job) {
+    STX_TRY(const auto kind, recognise(input));
+    if (kind != FileKind::atlas || !settings.any()) return kind == FileKind::atlas;
+    Job quiet;  // it is read again, by what says what there is to say
+    quiet.workFor(job);
+    STX_TRY(auto frames, openSequence(input, open, quiet));
+    frames = fromOrigin(std::move(frames));
+    STX_TRY(const auto views, frames->views(0, quiet));
+    STX_TRY(const bool needed, mayRefine(*views, settings, quiet));
+    return !needed;
+}
+
+/// A page for browsers, of an atlas' own textures where it may be.
 Result<Shown> writePage(const std::string& input, const OpenOptions& open,
                         const std::string& output, const std::string& refine, int jpegQuality,
                         Program& program) {
@@ -44,9 +58,10 @@ Result<Shown> writePage(const std::string& input, const OpenOptions& open,
         write.renderOptions.push_back(refine);
     }
     write.output = program.outputOptions();
-    STX_TRY(const auto kind, recognise(input));
+    STX_TRY(const auto settings, refineSettings(refine));
+    STX_TRY(const bool itself, showsItsTextures(input, open, settings, program.job));
     Result<PageReport> page = PageReport();
-    if (kind == FileKind::atlas) {
+    if (itself) {
         STX_TRY(auto atlas, openAtlas(input, open, program.job));
         countFromOrigin(atlas);
         page = writeViewerPage(atlas, output, write, program.job);

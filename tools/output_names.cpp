@@ -1,7 +1,11 @@
 #include "tools/output_names.hpp"
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <filesystem>
+#include <map>
+#include <set>
 
 #include "formats/files/named_files.hpp"
 #include "formats/files/no_case.hpp"
@@ -34,37 +38,67 @@ std::string clash(const NamedPath& output, const NamedPath& input) {
 
 }  // namespace
 
+std::optional<std::string> placeOf(const std::string& path) {
+    if (path.empty() || path == "-") return std::nullopt;
+    struct stat there = {};
+    if (::stat(path.c_str(), &there) != 0) return wholePath(path).string();
+    if (!S_ISREG(there.st_mode) && !S_ISDIR(there.st_mode)) return std::nullopt;
+    return fmt::format("{}:{}", there.st_dev, there.st_ino);
+}
+
 bool samePath(const std::string& a, const std::string& b) {
-    if (a.empty() || b.empty() || a == "-" || b == "-") return false;
-    std::error_code ec;
-    const auto there = fs::status(a, ec);
-    if (fs::exists(there) && fs::exists(b, ec))
-        return (fs::is_regular_file(there) || fs::is_directory(there)) && fs::equivalent(a, b, ec);
-    return wholePath(a) == wholePath(b);
+    const auto place = placeOf(a);
+    return place && place == placeOf(b);
 }
 
 Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
                               const std::vector<NamedPath>& inputs) {
-    const auto alone = std::ranges::count(inputs, "", &NamedPath::option);
-    for (auto output = outputs.begin(); output != outputs.end(); ++output) {
-        for (auto other = outputs.begin(); other != output; ++other) {
-            if (!samePath(output->path, other->path)) continue;
-            if (output->path == other->path)
-                return fail(ErrorCode::usage, "{} and {} are both '{}'; give them two names",
-                            output->option, other->option, output->path);
+    std::multimap<std::string, const NamedPath*> inputsAt;
+    for (const NamedPath& input : inputs)
+        if (auto place = placeOf(input.path)) inputsAt.emplace(std::move(*place), &input);
+    std::map<std::string, const NamedPath*> outputAt;
+    for (const NamedPath& output : outputs) {
+        const auto place = placeOf(output.path);
+        if (!place) continue;
+        const auto [at, isNew] = outputAt.emplace(*place, &output);
+        const NamedPath& other = *at->second;
+        if (!isNew && output.path == other.path)
+            return fail(ErrorCode::usage, "{} and {} are both '{}'; give them two names",
+                        output.option, other.option, output.path);
+        if (!isNew)
             return fail(ErrorCode::usage,
-                        "{} '{}' and {} '{}' are the same file; give them two names",
-                        output->option, output->path, other->option, other->path);
-        }
-        for (const NamedPath& input : inputs) {
-            const bool itself = output->replaces && input.option.empty() && alone == 1 &&
-                                !isNumberedFilm(input.path);
-            if (!itself && samePath(output->path, input.path))
-                return fail(ErrorCode::usage, "{}, which would be lost; give it another name",
-                            clash(*output, input));
-        }
+                        "{} '{}' and {} '{}' are the same file; give them two names", output.option,
+                        output.path, other.option, other.path);
+        const auto [first, end] = inputsAt.equal_range(*place);
+        const auto lost = std::find_if(first, end, [&](const auto& known) {
+            const NamedPath& input = *known.second;
+            return !input.option.empty() || input.path != output.replaces ||
+                   isNumberedFilm(input.path);
+        });
+        if (lost != end)
+            return fail(ErrorCode::usage, "{}, which would be lost; give it another name",
+                        clash(output, *lost->second));
     }
     return {};
+}
+
+std::string lastName(const std::string& path) {
+    const auto end = path.find_last_not_of('/');
+    const std::string whole = path.substr(0, end == std::string::npos ? 0 : end + 1);
+    std::string name = whole.substr(whole.rfind('/') + 1);
+    return name == "." || name == ".." ? wholePath(path).filename().string() : name;
+}
+
+std::vector<NamedPath> alikeAmong(const std::vector<std::string>& inputs,
+                                  const std::vector<NamedPath>& outputs) {
+    std::set<std::string> names;
+    for (const NamedPath& output : outputs)
+        for (const fs::path& path : {fs::path(output.path), wholePath(output.path)})
+            for (const fs::path& part : path) names.insert(part.string());
+    std::vector<NamedPath> alike;
+    for (const std::string& input : inputs)
+        if (names.contains(lastName(input))) alike.push_back({"", input});
+    return alike;
 }
 
 void rememberNumberedInputs(const std::vector<NamedPath>& inputs) {
@@ -102,6 +136,11 @@ Result<void> checkReportName(std::string_view path) {
             "inputs)",
             path, ending);
     return {};
+}
+
+bool mayHoldReport(const std::string& report, const std::vector<NamedPath>& others) {
+    return checkReportName(report) && checkReportIsNoMainFile(report, others) &&
+           std::ranges::none_of(others, [&](auto& o) { return samePath(o.path, report); });
 }
 
 std::string endingOfMedia(std::string_view path) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,19 +13,31 @@ namespace stx::tools {
 struct NamedPath {
     std::string option;  ///< "-o"; empty of an input that stands alone
     std::string path;    ///< "-" is a standard stream, and no file
-    /// Of an output: may take the place of the input, where that is the only one, and one file or
-    /// folder: the files of a numbered film change one by one, and are others where it is cut.
-    bool replaces = false;
+    /// Of an output: the input that stands alone whose place it may take; empty: none. A numbered
+    /// film keeps its place: its files change one by one, and are others where it is cut.
+    std::string replaces = {};
 };
 
-/// Whether both names are of one file or folder, which need not be there yet. Devices and pipes are
-/// none: several may write to /dev/null. Numbered names are compared as they are.
+/// The same for all names of one file or folder, which need not be there yet. Nothing of devices
+/// and pipes: several may write to /dev/null. Numbered names are taken as they are.
+[[nodiscard]] std::optional<std::string> placeOf(const std::string& path);
+
+/// Whether both names are of one file or folder, by placeOf().
 [[nodiscard]] bool samePath(const std::string& a, const std::string& b);
 
 /// Errors (usage), before anything is written, where an output is an input, which would be lost, or
 /// another output, of which one would be.
 [[nodiscard]] Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
                                             const std::vector<NamedPath>& inputs);
+
+/// Those of many inputs that may be an output, or a folder that one lies in: their last name is in
+/// its path. To look at each of a million files takes minutes where they are far away; a link of
+/// another name is not found so.
+[[nodiscard]] std::vector<NamedPath> alikeAmong(const std::vector<std::string>& inputs,
+                                                const std::vector<NamedPath>& outputs);
+
+/// The name of a file or folder without the folders that it is in.
+[[nodiscard]] std::string lastName(const std::string& path);
 
 /// Remembers the files of numbered inputs (`name_%04d.png`) as files that an input names.
 void rememberNumberedInputs(const std::vector<NamedPath>& inputs);
@@ -38,6 +51,9 @@ void rememberNumberedInputs(const std::vector<NamedPath>& inputs);
 /// Error (usage) where a report's name ends like that of a picture, a film, a scene or a model: it
 /// would take the place of one, perhaps of a texture that the input names.
 [[nodiscard]] Result<void> checkReportName(std::string_view path);
+
+/// Whether a mistake may be reported there: neither error above, and none of `others` is the file.
+[[nodiscard]] bool mayHoldReport(const std::string& report, const std::vector<NamedPath>& others);
 
 /// ".png", where a name ends like the file of a picture, a film, a scene, a model or an archive;
 /// else empty. Text and JSON are none of these.

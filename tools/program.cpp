@@ -423,8 +423,8 @@ std::string fileOfStill(const std::string& output) {
     return first && lowerExtension(*first) == ".exr" ? *first : output;
 }
 
-Result<std::string> folderTarget(const std::string& target, const std::vector<std::string>& files,
-                                 std::string_view expected) {
+Result<FolderTarget> folderTarget(const std::string& target, const std::vector<std::string>& files,
+                                  std::string_view expected) {
     if (target == "-")
         return fail(ErrorCode::usage,
                     "-o is '-', standard output, which takes one stream; {} is expected (-o ./- "
@@ -433,16 +433,17 @@ Result<std::string> folderTarget(const std::string& target, const std::vector<st
     std::string path = target;
     while (path.size() > 1 && path.back() == '/') path.pop_back();
     std::error_code ec;
-    if (path != target || std::filesystem::is_directory(path, ec)) return path;
+    if (path != target || std::filesystem::is_directory(path, ec)) return FolderTarget{path, true};
     const auto ending = std::filesystem::path(path).extension().string();
     // What people give to other programs; a folder's name may have any other dot in it.
-    const bool file = !endingOfMedia(path).empty() || ending == ".json" || ending == ".txt";
+    const bool file =
+        !endingOfMedia(path).empty() || equalNoCase(ending, ".json") || equalNoCase(ending, ".txt");
     if (file && std::ranges::none_of(files, [&](auto& f) { return equalNoCase(f, ending); }))
         return fail(ErrorCode::usage,
                     "-o '{}' ends in '{}', like a file; {} is expected (a slash at its end makes "
                     "any name a folder's)",
                     target, ending, expected);
-    return path;
+    return FolderTarget{path};
 }
 
 Result<void> checkPlotTarget(std::string_view option, const std::string& target, Program& program) {

@@ -117,12 +117,16 @@ class Program {
 /// The file that a bundle without frames goes to: of a numbered OpenEXR name the first, as a film
 /// of one frame has it; else `output`.
 [[nodiscard]] std::string fileOfStill(const std::string& output);
-/// A target that may be a folder, without slashes at its end. Error (usage) when it ends like a
-/// file, neither exists as a folder nor has a slash, and is none of `files` (".ply"); `expected` is
-/// for the message.
-[[nodiscard]] Result<std::string> folderTarget(const std::string& target,
-                                               const std::vector<std::string>& files,
-                                               std::string_view expected);
+/// A target that may be a folder.
+struct FolderTarget {
+    std::string path;     ///< without slashes at its end
+    bool folder = false;  ///< surely: it had a slash there, or is one already
+};
+/// Error (usage) when it ends like a file, is not surely a folder, and is none of `files` (".ply");
+/// `expected` is for the message.
+[[nodiscard]] Result<FolderTarget> folderTarget(const std::string& target,
+                                                const std::vector<std::string>& files,
+                                                std::string_view expected);
 /// Errors early, before an hour of work and not after it: as Program::makeFolderOf(), which makes
 /// the target's folder; (io) under --no-clobber, when the target exists; (usage) several numbers in
 /// its name.

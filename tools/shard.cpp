@@ -1,8 +1,12 @@
 #include "tools/shard.hpp"
 
+#include <filesystem>
+#include <span>
+
 #include <nlohmann/json.hpp>
 
 #include "lib/base/whole_number.hpp"
+#include "lib/model/same_pictures.hpp"
 
 namespace stx::tools {
 namespace {
@@ -27,6 +31,16 @@ Result<void> parseShard(const std::string& text, Shard& shard) {
 }
 
 }  // namespace
+
+void Shard::addInputs(const std::vector<std::string>& names) {
+    std::string all = job;
+    // Their last part, as of other paths: machines may have copies in folders of their own.
+    for (const std::string& name : names) {
+        const std::filesystem::path path(name);
+        all += '\0' + (path.has_filename() ? path : path.parent_path()).filename().string();
+    }
+    job = fmt::format("{:016x}", hashOf(std::as_bytes(std::span(all))));
+}
 
 Shard::Range Shard::rangeOf(std::size_t length) const {
     const auto n = static_cast<std::uint64_t>(count), k = static_cast<std::uint64_t>(number);

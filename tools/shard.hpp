@@ -14,8 +14,12 @@ namespace stx::tools {
 /// together they are the whole, and none has anything of another.
 struct Shard {
     std::int64_t number = 1, count = 1;  ///< K and N, 1 <= K <= N
-    std::string job;  ///< the same for all runs of one command line, see Command::jobOf()
+    /// The same for all runs of one command line on the same inputs, see Command::jobOf().
+    std::string job;
     bool given = false;
+
+    /// Makes the job that of these inputs, too: what a list holds may change between the runs.
+    void addInputs(const std::vector<std::string>& names);
 
     /// Of lists: each N-th, since neighbours in a list are often alike and cost the same.
     [[nodiscard]] bool takes(std::size_t index) const {

@@ -9,8 +9,7 @@ namespace stx::tools {
 ViewChange withDepthBits(int bits, CodedDepth& codes) {
     ViewChange change;
     change.change = [bits, &codes](ReferenceView& view, Job&) -> Result<void> {
-        setDepthBits(view, bits);
-        codes.add(view);
+        if (setDepthBits(view, bits)) codes.add(view);
         return {};
     };
     change.header = [bits](ViewHeader& header) { header.depthBits = bits; };

@@ -8,7 +8,7 @@
 
 namespace stx::tools {
 
-/// Gives each view these depth bits. `codes`, which outlive it, hear of them.
+/// Gives each view these depth bits. `codes`, which outlive it, hear of those that had others.
 [[nodiscard]] ViewChange withDepthBits(int bits, CodedDepth& codes);
 
 /// cubeFromInside() of views, which are in a spool in `folder` meanwhile where memory does not hold

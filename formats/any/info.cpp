@@ -296,6 +296,13 @@ Json objectsJson(const AtlasHeader& header) {
     return objects;
 }
 
+/// What the camera of a view counts from: objects that share an atlas lie in worlds of their own.
+glm::dvec3 originOfView(const Atlas& atlas, int view) {
+    for (const AtlasObject& o : atlas.objects)
+        if (view >= o.firstView && view < o.firstView + o.views) return o.origin;
+    return atlas.origin;
+}
+
 Result<void> describeAtlas(const fs::path& path, const std::string& object, Json& out, Job& job) {
     STX_TRY(auto header, readAtlasHeader(path, job.limits));
     if (!object.empty()) {
@@ -320,7 +327,8 @@ Result<void> describeAtlas(const fs::path& path, const std::string& object, Json
     out["nodeKind"] = second ? "SimpleTextureV2" : "SimpleTexture";
     if (!header.atlas.title.empty()) out["title"] = header.atlas.title;
     auto views = Json::array();
-    for (const auto& v : header.atlas.views) views.push_back(viewJson(v, header.atlas.origin));
+    for (const auto& v : header.atlas.views)
+        views.push_back(viewJson(v, originOfView(header.atlas, static_cast<int>(views.size()))));
     out["views"] = std::move(views);
     out["textures"] = std::move(textures);
     auto rectangles = Json::array();

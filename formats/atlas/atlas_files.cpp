@@ -8,6 +8,7 @@
 #include "formats/atlas/atlas_textures.hpp"
 #include "formats/exr/environment_exr.hpp"
 #include "formats/files/named_files.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/parallel_try.hpp"
 #include "lib/model/peak_memory.hpp"
@@ -22,9 +23,8 @@ constexpr const char* kIndexFile = "atlas.json";
 constexpr const char* kEnvironmentFile = "environment.exr";
 constexpr const char* kOpaque = "sRGB8-opaque";
 
-bool isExrName(const fs::path& path) {
-    const std::string ending = path.extension().string();
-    return ending == ".exr" || ending == ".EXR";
+bool isExr(const fs::path& path, const AtlasSaveOptions& options) {
+    return !options.folder && lowerExtension(path) == ".exr";
 }
 
 /// All that a folder of ours may hold, for the replacing of one. Digits stand for any number.
@@ -427,7 +427,7 @@ namespace {
 Result<void> writeAny(const Atlas& atlas, const fs::path& path, Job& job,
                       const AtlasSaveOptions& options, const DepthIsCoded& depthIsCoded) {
     STX_CHECK(atlas.check());
-    if (!isExrName(path)) return writeFolder(atlas, path, job, options, depthIsCoded);
+    if (!isExr(path, options)) return writeFolder(atlas, path, job, options, depthIsCoded);
     if (options.jpegQuality > 0)
         return failAt(fmt::format("'{}'", path.string()), ErrorCode::unsupported,
                       "an OpenEXR atlas holds no JPEG; name a folder instead of an .exr file");
@@ -447,13 +447,14 @@ Result<void> writeAtlas(Atlas&& atlas, const fs::path& path, Job& job,
     return writeAny(own, path, job, options, [&own](int page) { own.pages[page].depth = {}; });
 }
 
-std::optional<std::uint64_t> bytesToWriteAtlas(const fs::path& path) {
-    return isExrName(path) ? std::optional(peak::kAtlasInExr.perPixel) : std::nullopt;
+std::optional<std::uint64_t> bytesToWriteAtlas(const fs::path& path,
+                                               const AtlasSaveOptions& options) {
+    return isExr(path, options) ? std::optional(peak::kAtlasInExr.perPixel) : std::nullopt;
 }
 
 int largestImageSide(const Atlas& atlas, const fs::path& path, const AtlasSaveOptions& options) {
     int side = 0;
-    for (const auto& t : headerOf(atlas, isExrName(path), options.jpegQuality > 0).textures)
+    for (const auto& t : headerOf(atlas, isExr(path, options), options.jpegQuality > 0).textures)
         side = std::max({side, t.width, t.height});
     return side;
 }

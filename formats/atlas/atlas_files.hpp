@@ -64,13 +64,15 @@ struct AtlasSaveOptions {
     /// 1..100: colour of a folder is JPEG of this quality, colour.jpg, and its alpha goes without
     /// loss into the depth texture; 0: PNG, exact.
     int jpegQuality = 0;
+    bool folder = false;  ///< even where the name ends in .exr
     OutputFile::Options output = {};
 };
 
 /// Writes an atlas: one multi-part OpenEXR file (a part for each page) when the name ends in .exr,
-/// else a folder of atlas.json (formats/atlas/atlas.schema.json) and at most four images:
-/// colour.png, depth.png, normal.png, splat.png (and, where the views have them,
-/// metallic_roughness.png and emissive.png), those of page k > 0 as colour_k.png and so on.
+/// in letters of any case and without a slash behind it, else a folder of atlas.json
+/// (formats/atlas/atlas.schema.json) and at most four images: colour.png, depth.png, normal.png,
+/// splat.png (and, where the views have them, metallic_roughness.png and emissive.png), those of
+/// page k > 0 as colour_k.png and so on.
 /// The environment is environment.exr, or a part of its own (environment_exr.hpp).
 /// 8- and 16-bit depth comes back to the code and normals to 1/32767; an atlas with a view of 32
 /// depth bits gets .exr images, and everything comes back to the bit. Linear colour is colour.exr.
@@ -84,7 +86,8 @@ struct AtlasSaveOptions {
                                       const AtlasSaveOptions& options = {});
 
 /// For PackSettings::bytesToWrite: what writeAtlas() takes beside the pages.
-[[nodiscard]] std::optional<std::uint64_t> bytesToWriteAtlas(const std::filesystem::path& path);
+[[nodiscard]] std::optional<std::uint64_t> bytesToWriteAtlas(const std::filesystem::path& path,
+                                                             const AtlasSaveOptions& options);
 
 /// Longest side of the images that writeAtlas() makes of an atlas that passes check(), pixels:
 /// where an image holds two pictures of a page (AtlasTexture::secondX), it is larger than the page.

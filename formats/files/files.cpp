@@ -188,22 +188,24 @@ struct OutputFile::Impl {
     }
 };
 
-/// The files wait in a folder, whose lock is theirs: thousands of open files would be too many.
+/// All wait in a folder, whose lock is theirs: thousands of open files would be too many.
 struct OutputFiles::Impl {
-    std::map<fs::path, Temporary> folders;  ///< by the folder of the files' targets
+    std::map<fs::path, Temporary> waiting;  ///< by the folder of the targets
     std::vector<OutputFile> files;
+    std::vector<OutputFolder> folders;
 
     ~Impl() {
         files.clear();
+        folders.clear();
         std::error_code ec;
-        for (const auto& folder : folders) fs::remove_all(folder.second.path, ec);
+        for (const auto& folder : waiting) fs::remove_all(folder.second.path, ec);
     }
-    tl::expected<fs::path, int> folderIn(const fs::path& folder) {
-        if (const auto known = folders.find(folder); known != folders.end())
+    Result<fs::path> folderIn(const fs::path& folder, const fs::path& target) {
+        if (const auto known = waiting.find(folder); known != waiting.end())
             return known->second.path;
         auto made = createTemporaryFolder(folder);
-        if (!made) return tl::unexpected(made.error());
-        return folders.emplace(folder, std::move(*made)).first->second.path;
+        if (!made) return failIo("write", target, made.error());
+        return waiting.emplace(folder, std::move(*made)).first->second.path;
     }
 };
 
@@ -214,6 +216,7 @@ OutputFiles::~OutputFiles() = default;
 
 Result<void> OutputFiles::commit() {
     for (OutputFile& file : impl_->files) STX_CHECK(file.commit());
+    for (OutputFolder& folder : impl_->folders) STX_CHECK(folder.commit());
     return {};
 }
 
@@ -254,11 +257,7 @@ Result<OutputFile> OutputFile::create(const fs::path& target, Options options) {
 
     fs::path folder = folderOf(impl->real);
     removeStaleTemporaries(folder);
-    if (options.together) {
-        auto waiting = options.together->impl_->folderIn(folder);
-        if (!waiting) return failIo("write", target, waiting.error());
-        folder = std::move(*waiting);
-    }
+    if (options.together) STX_SET(folder, options.together->impl_->folderIn(folder, target));
     auto temporary = createTemporaryFile(folder);
     if (!temporary) return failIo("write", target, temporary.error());
     impl->fd = std::move(temporary->fd);
@@ -356,6 +355,10 @@ struct OutputFolder::Impl {
     fs::path named;   ///< as it was given to rememberTarget(); commit() may move `temporary`
     Descriptor lock;  ///< tells other runs that the temporary folder is in use
     bool committed = false;
+    bool waits = false;  ///< as that of OutputFile
+
+    /// Errors where there is a folder of that name that must stay.
+    [[nodiscard]] Result<void> checkFree() const;
 
     ~Impl() {
         std::error_code ec;
@@ -391,8 +394,9 @@ Result<OutputFolder> OutputFolder::create(const fs::path& target, OutputFile::Op
     STX_CHECK(checkIsNotNamed(named));
     STX_TRY(impl->real, throughLinks(named));
 
-    const fs::path folder = folderOf(impl->real);
+    fs::path folder = folderOf(impl->real);
     removeStaleTemporaries(folder);
+    if (options.together) STX_SET(folder, options.together->impl_->folderIn(folder, target));
     auto temporary = createTemporaryFolder(folder);
     if (!temporary) return failIo("write", target, temporary.error());
     impl->lock = std::move(temporary->fd);
@@ -463,9 +467,24 @@ Result<void> syncFiles(const fs::path& folder, const fs::path& target) {
 
 }  // namespace
 
+Result<void> OutputFolder::Impl::checkFree() const {
+    std::error_code ec;
+    if (!fs::exists(real, ec)) return {};
+    if (options.noClobber) return failExists(target);
+    return checkReplaceable(real, temporary, ownNames, target);
+}
+
 Result<void> OutputFolder::commit() {
     Impl& f = *impl_;
-    STX_CHECK(syncFiles(f.temporary, f.target));
+    if (!f.waits) STX_CHECK(syncFiles(f.temporary, f.target));
+    if (f.options.together && !f.waits) {
+        // Now, and not when others have their names already.
+        STX_CHECK(f.checkFree());
+        f.lock.close();
+        f.waits = true;
+        f.options.together->impl_->folders.push_back(OutputFolder(std::move(impl_)));
+        return {};
+    }
     int error = renameNoReplace(f.temporary, f.real);
     if (error == EPERM) {
         // Folders cannot be hard-linked where RENAME_NOREPLACE is unknown.
@@ -475,8 +494,7 @@ Result<void> OutputFolder::commit() {
                                                                      : errno;
     }
     if (error == EEXIST) {
-        if (f.options.noClobber) return failExists(f.target);
-        STX_CHECK(checkReplaceable(f.real, f.temporary, f.ownNames, f.target));
+        STX_CHECK(f.checkFree());
         if (::renameat2(AT_FDCWD, f.temporary.c_str(), AT_FDCWD, f.real.c_str(), RENAME_EXCHANGE) !=
             0) {
             if (errno != EINVAL && errno != ENOSYS) return failIo("replace", f.target, errno);

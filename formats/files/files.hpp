@@ -53,9 +53,9 @@ class OutputFile {
     std::unique_ptr<Impl> impl_;
 };
 
-/// Files that appear when all of them are whole, as the frames of a film: each is one of
-/// OutputFile::Options::together. Destroyed without commit(): none does. They are renamed one after
-/// the other: who is killed then leaves some of them, each whole.
+/// Files and folders that appear when all of them are whole, as the frames of a film: each is one
+/// of OutputFile::Options::together. Destroyed without commit(): none does. They are renamed one
+/// after the other: who is killed then leaves some of them, each whole.
 class OutputFiles {
   public:
     OutputFiles();
@@ -66,6 +66,7 @@ class OutputFiles {
 
   private:
     friend class OutputFile;
+    friend class OutputFolder;
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };

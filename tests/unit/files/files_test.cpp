@@ -149,13 +149,57 @@ TEST(OutputFiles, AppearTogetherOrNotAtAll) {
     EXPECT_EQ(count(), 3);
 }
 
+/// A folder with one file of that text.
+Result<void> writeFolder(const fs::path& target, const std::string& text,
+                         OutputFile::Options options) {
+    STX_TRY(auto out, OutputFolder::create(target, options, {}));
+    put(out.temporaryPath() / "colour.png", text);
+    return out.commit();
+}
+
 TEST(OutputFiles, OfThousandsKeepNoneOpen) {
     const TemporaryFolder folder;
     OutputFiles files;
     for (int i = 0; i < 3000; ++i)
         ASSERT_TRUE(writeFile(folder / std::to_string(i), Bytes(1), {.together = &files})) << i;
+    for (int i = 3000; i < 5000; ++i)
+        ASSERT_TRUE(writeFolder(folder / std::to_string(i), "", {.together = &files})) << i;
     ASSERT_TRUE(files.commit());
     EXPECT_TRUE(std::filesystem::exists(folder / "2999"));
+    EXPECT_TRUE(std::filesystem::exists(folder / "4999/colour.png"));
+}
+
+TEST(OutputFiles, HoldFoldersThatAppearTogetherOrNotAtAll) {
+    const TemporaryFolder folder;
+    put(folder / "a/colour.png", "old");
+    for (const bool commits : {false, true}) {
+        OutputFiles files;
+        for (const char* name : {"a", "b"})
+            ASSERT_TRUE(writeFolder(folder / name, "new", {.together = &files}));
+        EXPECT_EQ(get(folder / "a/colour.png"), "old");
+        EXPECT_FALSE(fs::exists(folder / "b"));
+        if (commits) {
+            ASSERT_TRUE(files.commit());
+            EXPECT_EQ(get(folder / "a/colour.png"), "new");
+            EXPECT_EQ(get(folder / "b/colour.png"), "new");
+        }
+    }
+    EXPECT_EQ(namesIn(folder.path()), (std::set<std::string>{"a", "b"}));
+}
+
+TEST(OutputFiles, RefuseAFolderThatMustStayBeforeOthersAreReplaced) {
+    const TemporaryFolder folder;
+    put(folder / "a/colour.png", "old");
+    put(folder / "b/thesis.tex", "precious");
+    {
+        OutputFiles files;
+        ASSERT_TRUE(writeFolder(folder / "a", "new", {.together = &files}));
+        const auto refused = writeFolder(folder / "b", "new", {.together = &files});
+        ASSERT_FALSE(refused);
+        EXPECT_NE(refused.error().message.find("'thesis.tex'"), std::string::npos);
+    }
+    EXPECT_EQ(get(folder / "a/colour.png"), "old");
+    EXPECT_EQ(namesIn(folder.path()), (std::set<std::string>{"a", "b"}));
 }
 
 TEST(OutputFiles, KeepWhatIsOfAFilmThatIsOpen) {
