@@ -48,25 +48,28 @@ constexpr std::uint64_t kSanitizerBytes = 0;
 class SceneConverter {
   public:
     SceneConverter(const ForeignScene& scene, AssimpFormat format, ModelFiles& files,
-                   const SideFiles& side, glm::dvec3 origin, std::set<std::string> bare)
+                   const SideFiles& side, const PlainText& plain, std::set<std::string> bare)
         : scene_(scene),
           format_(format),
           files_(files),
           builder_(files.job()),
           mtl_(side.materials()),
-          materialFolder_(side.materialFolder()),
           bare_(std::move(bare)) {
-        saysUndefined_ = format == AssimpFormat::obj && !files.replacesColour() &&
-                         (side.missing().empty() || side.hasMaterialFile());
-        builder_.setOrigin(origin);
-        if (format == AssimpFormat::dae || format == AssimpFormat::fbx) builder_.setRounded();
+        saysUndefined_ =
+            format == AssimpFormat::obj && (side.missing().empty() || side.hasMaterialFile());
+        builder_.setOrigin(plain.origin);
+        if (format == AssimpFormat::dae || format == AssimpFormat::fbx || !plain.unread.empty())
+            builder_.setRounded();
     }
 
     Result<Mesh> convert() {
+        if (std::ranges::any_of(scene_.meshes, [](const auto& mesh) { return !mesh.uvs.empty(); }))
+            place_ = files_.placeOfColour(builder_.textures());
         for (const auto& material : scene_.materials) STX_CHECK(convertMaterial(material));
-        if (saysUndefined_) noteUndefined();
+        if (saysUndefined_ && place_ < 0) noteUndefined();
         if (builder_.materials().empty()) {
-            builder_.materials().push_back({.name = "default", .hasColour = false});
+            builder_.materials().push_back(
+                {.name = "default", .baseColourTexture = place_, .hasColour = false});
             mtlOf_.emplace_back();
         }
         for (const auto& node : scene_.nodes)
@@ -92,8 +95,8 @@ class SceneConverter {
     Result<void> convertMaterial(const ForeignScene::Material& source) {
         Material m;
         m.name = source.name;
-        const auto known = mtl_.find(m.name);
-        MtlMaterial mtl = known == mtl_.end() ? MtlMaterial{} : known->second;
+        m.baseColourTexture = place_;
+        MtlMaterial mtl = mtlNamed(m.name);
 
         const bool hasMap = textureOf(source, Use::diffuse).has_value();
         // Assimp invents a grey where the file says nothing.
@@ -228,6 +231,12 @@ class SceneConverter {
         return {};
     }
 
+    /// Nothing special where no material file has it.
+    [[nodiscard]] MtlMaterial mtlNamed(const std::string& name) const {
+        const auto known = mtl_.find(name);
+        return known == mtl_.end() ? MtlMaterial{} : known->second;
+    }
+
     static const std::optional<ForeignScene::Texture>& textureOf(
         const ForeignScene::Material& source, Use use) {
         return source.textures[static_cast<std::size_t>(use)];
@@ -246,7 +255,8 @@ class SceneConverter {
         if (named.embedded >= 0)
             return embeddedTexture(scene_.embedded[named.embedded], named.name, state);
         // Names are relative to the material file for some programs, to the model for others.
-        return files_.textureFromFile(named.name, state, builder_.textures(), materialFolder_);
+        return files_.textureFromFile(named.name, state, builder_.textures(),
+                                      mtlNamed(source.name).folder);
     }
 
     /// A picture inside the model's own file: a PNG or JPEG as it is, or plain texels.
@@ -334,9 +344,11 @@ class SceneConverter {
         return {};
     }
 
-    /// Faces cut into triangles; counts lines and, where there are triangles, points.
+    /// Faces cut into triangles; counts lines and, where there are triangles, points. Without faces
+    /// of any kind all vertices are points.
     void addFaces(const ForeignScene::Mesh& mesh, MeshPart& part) {
         std::size_t points = 0;
+        std::vector<bool> named(part.positions.size());  // as points
         const bool triangles = mesh.cornerCounts.empty();
         const std::size_t faces = triangles ? mesh.corners.size() / 3 : mesh.cornerCounts.size();
         part.triangles.reserve(faces);
@@ -357,6 +369,7 @@ class SceneConverter {
                     part.triangles.emplace_back(face[t.x], face[t.y], face[t.z]);
             } else if (sides == 1) {
                 ++points;
+                named[face[0]] = true;
             } else {
                 ++lines_;
             }
@@ -364,12 +377,14 @@ class SceneConverter {
         }
         if (!part.triangles.empty()) points_ += points;
         part.points = part.triangles.empty() && (points > 0 || faces == 0);
+        if (part.points && faces > 0) keepVertices(part, named);
     }
 
     /// Without texture coordinates a part gets its material without textures.
     void dropTexturesWithoutUvs(MeshPart& part) {
         const auto& material = builder_.materials()[part.material];
-        const bool textured = material.baseColourTexture >= 0 || material.emissiveTexture >= 0;
+        const bool textured = material.baseColourTexture >= 0 || material.emissiveTexture >= 0 ||
+                              material.normalTexture >= 0;
         if (!textured || !part.uvs.empty()) return;
         files_.job().note(
             fmt::format("{} has the textured material '{}' but no texture coordinates; the "
@@ -406,11 +421,32 @@ class SceneConverter {
     const std::map<std::string, MtlMaterial>& mtl_;
     std::vector<MtlMaterial> mtlOf_;  ///< of each material
     std::vector<glm::dmat4> worldFromNode_;
-    std::string materialFolder_;
+    int place_ = -1;              ///< of the caller's picture, in all materials
     std::set<std::string> bare_;  ///< materials that have faces with and without coordinates
     std::size_t lines_ = 0, points_ = 0;
     bool saysUndefined_ = false;  ///< nothing has been said of materials without a file
 };
+
+/// Says what of a COLLADA text is not read.
+void noteNotRead(const PlainCollada& collada, Job& job) {
+    if (!collada.wrap.empty())
+        job.note(fmt::format(
+            "wrap '{}' of samplers is not read, only WRAP, CLAMP and MIRROR: textures repeat",
+            collada.wrap));
+    if (!collada.twoSkeletons.empty())
+        job.note(
+            fmt::format("skin '{}' is shown with several skeletons; all have the pose of the first",
+                        collada.twoSkeletons));
+    if (collada.morphs > 0)
+        job.note(fmt::format("dropped: morphs ({}); what they morph has its base shape",
+                             collada.morphs));
+    if (collada.holes > 0)
+        job.note(fmt::format("holes of polygons are not read: {} are filled", collada.holes));
+    if (!collada.boundTwice.empty())
+        job.note(fmt::format(
+            "'{}' is bound to several sets of texture coordinates; all textures have the first",
+            collada.boundTwice));
+}
 
 /// What the process `of` says of the model that it was asked for.
 Result<ForeignScene> hear(DecoderProcess& of, AssimpFormat format, SideFiles& side,
@@ -483,10 +519,15 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
             STX_SET(collada, plainCollada(bytes));
             bytes = std::as_bytes(std::span(collada.text));
         }
-        std::optional<PlainText> plain;
+        PlainText plain;
         if (format == AssimpFormat::obj) plain = plainCoordinates(bytes, "v");
         if (format == AssimpFormat::stl) plain = plainCoordinates(bytes, "vertex");
-        if (plain) bytes = plain->text;
+        if (plain.text) bytes = *plain.text;
+        if (!plain.unread.empty())
+            files.job().note(fmt::format(
+                "'{}', expected '{} X Y Z': vertices are as Assimp takes them, their "
+                "coordinates rounded to 32-bit floats",
+                plain.unread.substr(0, 60), format == AssimpFormat::obj ? "v" : "vertex"));
         DecoderBounds bounds;
         bounds.memoryBytes = limits.maxMemoryBytes + kSanitizerBytes;
         bounds.cpuSeconds = kMostModelSeconds;
@@ -508,26 +549,8 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         if (!side.missing().empty() && !side.hasMaterialFile())
             files.job().note(
                 fmt::format("material file {}; its materials have no colour", side.missing()));
-        if (!collada.wrap.empty())
-            files.job().note(fmt::format(
-                "wrap '{}' of samplers is not read, only WRAP, CLAMP and MIRROR: textures repeat",
-                collada.wrap));
-        if (!collada.twoSkeletons.empty())
-            files.job().note(fmt::format(
-                "skin '{}' is shown with several skeletons; all have the pose of the first",
-                collada.twoSkeletons));
-        if (collada.morphs > 0)
-            files.job().note(fmt::format("dropped: morphs ({}); what they morph has its base shape",
-                                         collada.morphs));
-        if (collada.holes > 0)
-            files.job().note(
-                fmt::format("holes of polygons are not read: {} are filled", collada.holes));
-        if (!collada.boundTwice.empty())
-            files.job().note(fmt::format(
-                "'{}' is bound to several sets of texture coordinates; all textures have the first",
-                collada.boundTwice));
-        return SceneConverter(scene, format, files, side, plain ? plain->origin : glm::dvec3(0.0),
-                              std::move(faces.bareMaterials))
+        noteNotRead(collada, files.job());
+        return SceneConverter(scene, format, files, side, plain, std::move(faces.bareMaterials))
             .convert();
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::failed, "the model needs more memory than there is");

@@ -5,8 +5,8 @@
 
 namespace stx {
 
-Result<Mesh> readDraco(ByteSpan bytes, Job& job) {
-    MeshBuilder builder(job);
+Result<Mesh> readDraco(ByteSpan bytes, ModelFiles& files) {
+    MeshBuilder builder(files.job());
     STX_TRY(const auto geometry,
             DracoGeometry::decode(bytes, [&](std::uint64_t n, std::uint64_t each) {
                 return builder.charge(n, each, "the Draco stream");
@@ -53,10 +53,13 @@ Result<Mesh> readDraco(ByteSpan bytes, Job& job) {
             ++dropped;
         }
     }
-    if (dropped > 0) job.note(fmt::format("dropped: {} attributes of the Draco stream", dropped));
+    if (dropped > 0)
+        files.job().note(fmt::format("dropped: {} attributes of the Draco stream", dropped));
     if (part.positions.empty() && count > 0)
         return fail(ErrorCode::invalidInput, "the Draco stream has no positions");
-    builder.materials().push_back({.name = "default", .hasColour = false});
+    const int place = part.uvs.empty() ? -1 : files.placeOfColour(builder.textures());
+    builder.materials().push_back(
+        {.name = "default", .baseColourTexture = place, .hasColour = false});
     STX_CHECK(builder.add(std::move(part)));
     return builder.finish();
 }

@@ -48,6 +48,7 @@ void copyVertex(std::vector<T>& values, std::uint32_t from) {
 }
 
 constexpr glm::vec3 kNoNormal{0.0f};
+constexpr glm::vec4 kAnyTangent{1, 0, 0, 1};
 
 /// Gives the corners of triangles for which missing(vertex) the normal of their face. A vertex that
 /// has another face's already is copied: position and normal here, all else by copyOthers(vertex).
@@ -71,8 +72,6 @@ void giveFaceNormals(std::vector<glm::dvec3>& positions, std::vector<glm::uvec3>
             normals[t[k]] = face;
         }
     }
-    for (auto& n : normals)
-        if (n == kNoNormal) n = glm::vec3(0, 0, 1);
 }
 
 /// Twice the signed area of a triangle in its uvs: mirrored ones have the other sign.
@@ -147,7 +146,7 @@ Result<void> MeshBuilder::add(MeshPart part) {
 
     const auto added = part.positions.size();
     append(mesh_.normals, before, part.normals, added, kNoNormal);
-    append(mesh_.tangents, before, part.tangents, added, glm::vec4(1, 0, 0, 1));
+    append(mesh_.tangents, before, part.tangents, added, kAnyTangent);
     append(mesh_.colours, before, part.colours, added, glm::vec4(1));
     for (const auto& [ofPart, ofMesh] : kOwnUvs) {
         const auto& own = part.*ofPart;
@@ -183,21 +182,8 @@ void MeshBuilder::dropBrokenPoints(MeshPart& part) {
     }
     points_ += count;
     brokenPoints_ += found;
-    if (found == 0) return;
-    const auto keep = [&](auto& values) {
-        if (values.empty()) return;
-        std::size_t kept = 0;
-        for (std::size_t i = 0; i < count; ++i) {
-            if (!broken[i]) values[kept++] = values[i];
-        }
-        values.resize(kept);
-    };
-    keep(part.positions);
-    keep(part.normals);
-    keep(part.tangents);
-    keep(part.colours);
-    keep(part.uvs);
-    for (const auto& [own, _] : kOwnUvs) keep(part.*own);
+    broken.flip();
+    if (found > 0) keepVertices(part, broken);
 }
 
 /// A Mesh has no material of points: its colour goes into their vertices.
@@ -258,19 +244,17 @@ void MeshBuilder::repair(MeshPart& part) {
                 if (part.normals[t[k]] == kNoNormal) part.normals[t[k]] = glm::vec3(face);
             }
         }
-        for (auto& n : part.normals) {
-            if (n == kNoNormal) n = glm::vec3(0, 0, 1);
-        }
     }
-    if (brokenNormals > 0 && !part.triangles.empty())
-        job_.note(fmt::format("{}: {} normals are no directions; those of the triangles are used",
-                              part.where, brokenNormals));
+    if (brokenNormals > 0 && (part.points || !part.triangles.empty()))
+        job_.note(fmt::format(
+            "{}: {} normals are no directions; {}", part.where, brokenNormals,
+            part.points ? "these points have none" : "those of the triangles are used"));
 
     for (auto& t : part.tangents) {
         const float length = glm::length(glm::vec3(t));
         t = std::isfinite(length) && length > 0
                 ? glm::vec4(glm::vec3(t) / length, t.w < 0 ? -1.0f : 1.0f)
-                : glm::vec4(1, 0, 0, 1);
+                : kAnyTangent;
     }
     const bool hasNormalMap = !part.triangles.empty() && part.material < mesh_.materials.size() &&
                               mesh_.materials[part.material].normalTexture >= 0;
@@ -414,6 +398,23 @@ void noteOrigin(glm::dvec3 origin, Job& job) {
                     origin.x, origin.y, origin.z));
 }
 
+void keepVertices(MeshPart& part, const std::vector<bool>& kept) {
+    const auto keep = [&](auto& values) {
+        if (values.empty()) return;
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < kept.size(); ++i) {
+            if (kept[i]) values[count++] = values[i];
+        }
+        values.resize(count);
+    };
+    keep(part.positions);
+    keep(part.normals);
+    keep(part.tangents);
+    keep(part.colours);
+    keep(part.uvs);
+    for (const auto& [own, _] : kOwnUvs) keep(part.*own);
+}
+
 void addFlatNormals(MeshPart& part) {
     part.normals.assign(part.positions.size(), kNoNormal);
     giveFaceNormals(
@@ -476,9 +477,10 @@ void addTangents(MeshPart& part) {
             across[t[k]] += dv;
         }
     }
-    part.tangents.resize(part.positions.size());
+    part.tangents.assign(part.positions.size(), kAnyTangent);
     for (std::size_t i = 0; i < part.tangents.size(); ++i) {
         const glm::dvec3 n(part.normals[i]);
+        if (part.normals[i] == kNoNormal) continue;  // of no triangle
         auto tangent = along[i] - n * glm::dot(n, along[i]);
         if (!(glm::length(tangent) > 0)) {
             // No direction in the uvs: any one across the normal will do.

@@ -42,8 +42,9 @@ class MeshBuilder {
     /// Appends a part. Errors (invalidInput) name part and vertex: a position that is not finite,
     /// an index out of range. Points of a cloud at no finite place are skipped and counted.
     /// Triangles without area are left out and counted; normals that are not directions are
-    /// replaced by those of the triangles; uvs and colours that are not finite become 0. The colour
-    /// of points is that of their vertices times that of their material; its texture is not used.
+    /// replaced by those of the triangles, of points by none; uvs and colours that are not finite
+    /// become 0. The colour of points is that of their vertices times that of their material; its
+    /// texture is not used.
     [[nodiscard]] Result<void> add(MeshPart part);
 
     /// How many were appended.
@@ -81,6 +82,9 @@ class MeshBuilder {
 
 /// Says that coordinates count from an origin, unless it is 0.
 void noteOrigin(glm::dvec3 origin, Job& job);
+
+/// Leaves the other vertices out: a part of points has no more than those that are drawn.
+void keepVertices(MeshPart& part, const std::vector<bool>& kept);
 
 /// Gives each vertex the normal of its triangle; a vertex of several unlike triangles is doubled.
 void addFlatNormals(MeshPart& part);

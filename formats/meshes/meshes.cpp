@@ -1,6 +1,7 @@
 #include "formats/meshes/meshes.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <set>
 
 #include "formats/files/deflate.hpp"
@@ -96,25 +97,32 @@ std::filesystem::path textureBeside(const std::filesystem::path& model) {
     return found;
 }
 
-/// Gives every material this base colour texture; where readers kept places for it
-/// (ModelFiles::replacesColour()), those that have one.
-Result<void> addTexture(Mesh& mesh, const std::filesystem::path& path, Job& job) {
-    STX_TRY(const auto bytes, readFile(path, job.limits));
-    STX_TRY(auto pixels, within(fmt::format("'{}'", path.string()),
-                                decodeRgba8(bytes, path.filename().string(), job.limits)));
-    noteMorePictures(bytes, path.filename().string(), job);
+/// A picture that a model gets as its base colour texture.
+struct Picture {
+    std::string name;  ///< without its folder
+    Bytes file;
+    Rgba8Image pixels;
+};
+
+Result<Picture> readPicture(const std::filesystem::path& path, const Limits& limits) {
+    Picture picture;
+    picture.name = path.filename().string();
+    STX_SET(picture.file, readFile(path, limits));
+    STX_SET(picture.pixels, within(fmt::format("'{}'", path.string()),
+                                   decodeRgba8(picture.file, picture.name, limits)));
+    return picture;
+}
+
+/// Puts it where readers kept places for it (ModelFiles::replacesColour()).
+Result<void> putPicture(const Picture& picture, Mesh& mesh, Job& job) {
+    noteMorePictures(picture.file, picture.name, job);
     std::set<int> places;
     for (const auto& material : mesh.materials)
         if (material.baseColourTexture >= 0) places.insert(material.baseColourTexture);
-    if (places.empty()) {
-        const int index = static_cast<int>(mesh.textures.size());
-        mesh.textures.push_back({std::move(pixels)});
-        for (auto& material : mesh.materials) material.baseColourTexture = index;
-        return {};
-    }
-    STX_CHECK(job.limits.checkAllocation(places.size() * pixels.count(), sizeof(glm::u8vec4),
-                                         "the copies of the texture"));
-    for (const int place : places) mesh.textures[static_cast<std::size_t>(place)].pixels = pixels;
+    STX_CHECK(job.limits.checkAllocation(places.size() * picture.pixels.count(),
+                                         sizeof(glm::u8vec4), "the copies of the texture"));
+    for (const int place : places)
+        mesh.textures[static_cast<std::size_t>(place)].pixels = picture.pixels;
     return {};
 }
 
@@ -136,12 +144,7 @@ void giveGrey(Mesh& mesh, Job& job) {
         "--light dir:-1,-1,-1)");
 }
 
-Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::path& path, Job& job,
-                        const MeshOptions& options) {
-    const auto folder =
-        path.parent_path().empty() || path == "-" ? std::filesystem::path(".") : path.parent_path();
-    ModelFiles files(folder, job, !options.texture.empty(), options.materials);
-    const auto name = path.filename().string();
+Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::string& name, ModelFiles& files) {
     if (format == Format::glb && !textOf(bytes).starts_with("glTF"))
         return fail(
             ErrorCode::invalidInput,
@@ -151,7 +154,7 @@ Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::pa
         case Format::glb:
             return readGltf(bytes, files);
         case Format::draco:
-            return readDraco(bytes, job);
+            return readDraco(bytes, files);
         case Format::obj:
             return readWithAssimp(bytes, AssimpFormat::obj, name, files);
         case Format::ply:
@@ -159,13 +162,13 @@ Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::pa
         case Format::stl:
             return readWithAssimp(bytes, AssimpFormat::stl, name, files);
         case Format::off:
-            return readOff(bytes, job);
+            return readOff(bytes, files);
         case Format::dae:
             return readWithAssimp(bytes, AssimpFormat::dae, name, files);
         case Format::fbx:
             return readWithAssimp(bytes, AssimpFormat::fbx, name, files);
         case Format::spz:
-            return readSpz(bytes, job);
+            return readSpz(bytes, files.job());
         case Format::none:
             break;
     }
@@ -186,11 +189,11 @@ Result<Mesh> readMesh(const std::filesystem::path& path, Job& job, const MeshOpt
     return readMesh(std::move(bytes), path, job, options);
 }
 
-Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& given, Job& job,
+Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& file, Job& job,
                       const MeshOptions& options) {
-    const auto where = fmt::format("'{}'", given.string());
-    std::filesystem::path path = given;
-    if (isPacked(given) && isGzip(bytes)) {
+    const auto where = fmt::format("'{}'", file.string());
+    std::filesystem::path path = file;
+    if (isPacked(file) && isGzip(bytes)) {
         STX_TRY(bytes, within(where, gunzip(bytes, job.limits)));
         path.replace_extension();
     }
@@ -203,24 +206,36 @@ Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& given, Job& job,
     }
     const auto format =
         formatOf(path, ByteSpan(bytes).first(std::min<std::size_t>(bytes.size(), 4096)));
-    auto mesh = readFormat(format, bytes, path, job, options);
-    if (!mesh) return tl::unexpected(mesh.error().at(where));
+    const bool given = !options.texture.empty();
+    auto texture = options.texture;
+    if (!given && format == Format::obj && path != "-" &&
+        textOf(bytes).find("mtllib") == std::string_view::npos)
+        texture = textureBeside(path);
+    std::optional<Picture> picture;
+    if (!texture.empty()) {
+        auto found = readPicture(texture, job.limits);
+        if (found)
+            picture = std::move(*found);
+        else if (given)
+            return tl::unexpected(found.error());
+    }
 
-    if (!options.texture.empty()) {
-        if (mesh->uvs.empty())
-            return failAt(
-                where, ErrorCode::usage,
-                "the model has no texture coordinates, so the texture '{}' cannot be put on it",
-                options.texture.string());
-        STX_CHECK(addTexture(*mesh, options.texture, job));
-    } else if (format == Format::obj && mesh->textures.empty() && !mesh->uvs.empty() &&
-               path != "-" && textOf(bytes).find("mtllib") == std::string_view::npos) {
-        if (const auto beside = textureBeside(path); !beside.empty()) {
-            if (addTexture(*mesh, beside, job))
-                job.note(fmt::format(
-                    "the model names no material; '{}' beside it is taken as its texture",
-                    beside.filename().string()));
-        }
+    const auto folder =
+        path.parent_path().empty() || path == "-" ? std::filesystem::path(".") : path.parent_path();
+    ModelFiles files(folder, job, picture.has_value(), options.materials);
+    auto mesh = readFormat(format, bytes, path.filename().string(), files);
+    if (!mesh) return tl::unexpected(mesh.error().at(where));
+    if (picture && !mesh->uvs.empty()) {
+        STX_CHECK(putPicture(*picture, *mesh, job));
+        if (!given)
+            job.note(
+                fmt::format("the model names no material; '{}' beside it is taken as its texture",
+                            picture->name));
+    } else if (given) {
+        return failAt(where, ErrorCode::usage,
+                      "the model has no texture coordinates, so the texture '{}' cannot be put on "
+                      "it",
+                      options.texture.string());
     }
     giveGrey(*mesh, job);
     return mesh;

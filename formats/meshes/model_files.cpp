@@ -54,12 +54,18 @@ std::string_view ModelFiles::whyNotThere(std::string_view name, const Error& err
     return "is outside of the model's folder (--allow-outside reads what is there) and not in it";
 }
 
-std::optional<int> ModelFiles::known(std::string_view name, SamplerState s,
+int ModelFiles::placeOfColour(std::vector<MeshTexture>& textures) const {
+    if (!replacesColour_) return -1;
+    textures.push_back({Rgba8Image(1, 1)});
+    return static_cast<int>(textures.size()) - 1;
+}
+
+std::optional<int> ModelFiles::known(const std::string& id, SamplerState s,
                                      std::vector<MeshTexture>& textures) {
-    const auto it = first_.find(name);
+    const auto it = first_.find(id);
     if (it == first_.end()) return std::nullopt;
     if (it->second < 0) return -1;
-    const Key key{std::string(name), s.wrapU, s.wrapV, s.nearest};
+    const Key key{id, s.wrapU, s.wrapV, s.nearest};
     if (const auto same = textures_.find(key); same != textures_.end()) return same->second;
     MeshTexture copy = textures[it->second];
     copy.wrapU = s.wrapU;
@@ -77,33 +83,40 @@ Result<int> ModelFiles::textureFromFile(std::string_view name, SamplerState samp
                                         const std::string& alsoIn) {
     if (name.size() > 2 && name.starts_with('"') && name.ends_with('"'))
         name = name.substr(1, name.size() - 2);  // as some programs write names with blanks
-    if (const auto index = known(name, sampler, textures)) return *index;
     const auto without = [&](const Error& error) {
-        job_.note(fmt::format("texture '{}' {}; the plain colour is used instead", name,
-                              whyNotThere(name, error)));
-        first_.emplace(std::string(name), -1);
+        if (missing_.emplace(name).second)
+            job_.note(fmt::format("texture '{}' {}; the plain colour is used instead", name,
+                                  whyNotThere(name, error)));
         return -1;
     };
     const auto path = find(name, alsoIn);
     if (!path) return without(path.error());
+    const std::string id = path->string();
+    if (const auto index = known(id, sampler, textures)) return *index;
     const auto bytes = readFile(*path, job_.limits);
     if (!bytes) {
         if (bytes.error().code == ErrorCode::io) return without(bytes.error());
         return tl::unexpected(bytes.error().at(fmt::format("texture '{}'", name)));
     }
-    return textureFromBytes(*bytes, name, sampler, textures);
+    return decode(*bytes, name, id, sampler, textures);
 }
 
 Result<int> ModelFiles::textureFromBytes(ByteSpan bytes, std::string_view name,
                                          SamplerState sampler, std::vector<MeshTexture>& textures) {
-    if (const auto index = known(name, sampler, textures)) return *index;
+    const std::string id(name);
+    if (const auto index = known(id, sampler, textures)) return *index;
+    return decode(bytes, name, id, sampler, textures);
+}
+
+Result<int> ModelFiles::decode(ByteSpan bytes, std::string_view name, const std::string& id,
+                               SamplerState sampler, std::vector<MeshTexture>& textures) {
     auto pixels = decodeRgba8(bytes, name, job_.limits);
     if (!pixels) {
         if (pixels.error().code == ErrorCode::failed) return tl::unexpected(pixels.error());
         job_.note(
             fmt::format("texture '{}' cannot be decoded ({}); the plain colour is used instead",
                         name, pixels.error().message));
-        first_.emplace(std::string(name), -1);
+        first_.emplace(id, -1);
         return -1;
     }
     noteMorePictures(bytes, name, job_);
@@ -117,8 +130,8 @@ Result<int> ModelFiles::textureFromBytes(ByteSpan bytes, std::string_view name,
             job_.limits.maxMemoryBytes >> 20);
     const int index = static_cast<int>(textures.size());
     textures.push_back(std::move(texture));
-    first_.emplace(std::string(name), index);
-    textures_.emplace(Key{std::string(name), sampler.wrapU, sampler.wrapV, sampler.nearest}, index);
+    first_.emplace(id, index);
+    textures_.emplace(Key{id, sampler.wrapU, sampler.wrapV, sampler.nearest}, index);
     return index;
 }
 

@@ -45,10 +45,13 @@ class ModelFiles {
     /// What a note says of a file that find() did not find, with its error.
     [[nodiscard]] std::string_view whyNotThere(std::string_view name, const Error& error) const;
 
-    /// Base colour textures of materials need not be opened: another one is put on all of them. A
-    /// reader may give materials a texture of one pixel instead, which keeps how theirs is sampled;
-    /// then these get the other one, and no others do.
+    /// Base colour textures of materials need not be opened: readers give materials whose parts
+    /// have texture coordinates a texture of one pixel, which keeps how theirs is sampled. These
+    /// get another picture, and no others do.
     [[nodiscard]] bool replacesColour() const { return replacesColour_; }
+
+    /// A new texture of one pixel for that; -1 where nothing is replaced.
+    [[nodiscard]] int placeOfColour(std::vector<MeshTexture>& textures) const;
 
     /// Metallic-roughness is asked for.
     [[nodiscard]] bool materials() const { return materials_; }
@@ -69,16 +72,21 @@ class ModelFiles {
 
   private:
     using Key = std::tuple<std::string, MeshTexture::Wrap, MeshTexture::Wrap, bool>;
-    /// The texture known by this name: with the same sampler itself, else a copy; nothing when new.
-    std::optional<int> known(std::string_view name, SamplerState sampler,
+    /// The texture known by this id: with the same sampler itself, else a copy; nothing when new.
+    std::optional<int> known(const std::string& id, SamplerState sampler,
                              std::vector<MeshTexture>& textures);
+    /// A new one.
+    Result<int> decode(ByteSpan bytes, std::string_view name, const std::string& id,
+                       SamplerState sampler, std::vector<MeshTexture>& textures);
 
     std::filesystem::path folder_;
     Job& job_;
     bool replacesColour_ = false, materials_ = false;
     mutable std::set<std::string, std::less<>> told_;  ///< names that were found elsewhere
+    std::set<std::string, std::less<>> missing_;       ///< names that notes say so of
+    // By ids: paths of files, names of images in memory.
     std::map<Key, int> textures_;
-    std::map<std::string, int, std::less<>> first_;  ///< by name alone
+    std::map<std::string, int> first_;  ///< -1: it cannot be decoded
     std::uint64_t pixelBytes_ = 0;
 };
 

@@ -125,7 +125,8 @@ std::optional<std::string> plainLine(std::string_view key, std::string_view valu
 
 }  // namespace
 
-PlainMtl plainMtl(std::string_view text, std::map<std::string, MtlMaterial>& materials) {
+PlainMtl plainMtl(std::string_view text, const std::string& folder,
+                  std::map<std::string, MtlMaterial>& materials) {
     PlainMtl out;
     MtlMaterial* current = nullptr;
     for (int number = 1; !text.empty(); ++number) {
@@ -134,6 +135,7 @@ PlainMtl plainMtl(std::string_view text, std::map<std::string, MtlMaterial>& mat
         const auto key = keyOf(takeWord(value));
         if (key == "newmtl") {
             current = &materials[std::string(value)];
+            current->folder = folder;
             out.text += fmt::format("newmtl {}\n", value);
         } else if (current && !key.empty()) {
             if (const auto plain = plainLine(key, value, *current))

@@ -11,6 +11,7 @@ namespace stx {
 
 /// What Assimp's OBJ importer does not report about a material of an MTL file.
 struct MtlMaterial {
+    std::string folder;                       ///< of the file, as plainMtl() was given it
     bool hasDiffuse = false;                  ///< a Kd line
     bool hasDissolve = false;                 ///< a d line
     bool hasTransparency = false;             ///< a Tr line and no d line
@@ -32,8 +33,9 @@ struct PlainMtl {
     std::vector<std::string> unread;
 };
 
-/// Adds the materials of an MTL text to `materials`, by name.
-[[nodiscard]] PlainMtl plainMtl(std::string_view text,
+/// Adds the materials of an MTL text to `materials`, by name. `folder`: that of the text, relative
+/// to the model's; empty when it is the same.
+[[nodiscard]] PlainMtl plainMtl(std::string_view text, const std::string& folder,
                                 std::map<std::string, MtlMaterial>& materials);
 
 /// The files that what follows a `mtllib` names. Names may have blanks: one ends with ".mtl".

@@ -1,6 +1,5 @@
 #include "formats/meshes/obj_faces.hpp"
 
-#include <cmath>
 #include <map>
 #include <string>
 #include <unordered_map>
@@ -14,14 +13,16 @@
 namespace stx {
 namespace {
 
-/// Takes the next line off a text, joined where it goes on behind a backslash, without its comment.
+/// Takes the next line off a text, joined where it goes on behind a backslash, without comments,
+/// which end where their lines do.
 /// `joined` keeps it where it is not as in the text.
 std::string_view joinedLine(std::string_view& text, std::string& joined) {
     joined.clear();
     std::string_view line;
     for (bool goesOn = true; goesOn && !text.empty();) {
         const auto end = text.find('\n');
-        line = trimmed(text.substr(0, end));
+        line = text.substr(0, end);
+        line = trimmed(line.substr(0, line.find('#')));
         text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
         goesOn = line.ends_with('\\');
         if (!goesOn && joined.empty()) break;
@@ -29,7 +30,7 @@ std::string_view joinedLine(std::string_view& text, std::string& joined) {
         joined += ' ';
         line = joined;
     }
-    return line.substr(0, line.find('#'));
+    return line;
 }
 
 /// Calls visit(keyword, what is behind it, the line as it is) for each line until it gives false.
@@ -86,7 +87,7 @@ bool readPosition(std::string_view values, glm::dvec3& position) {
         auto word = takeWord(values);
         if (word.starts_with('+')) word.remove_prefix(1);
         const auto number = wholeNumber<double>(word);
-        if (!number || !std::isfinite(*number)) return false;
+        if (!number) return false;
         position[k] = *number;
     }
     return true;

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
+#include <limits>
 #include <optional>
 #include <string_view>
 
@@ -18,10 +20,8 @@ namespace {
 /// three counts, a line for each vertex, a line for each face.
 class OffReader {
   public:
-    OffReader(ByteSpan bytes, Job& job)
-        : left_(reinterpret_cast<const char*>(bytes.data()), bytes.size()),
-          job_(job),
-          builder_(job) {}
+    OffReader(ByteSpan bytes, ModelFiles& files)
+        : left_(textOf(bytes)), files_(files), job_(files.job()), builder_(files.job()) {}
 
     Result<Mesh> read() {
         STX_CHECK(readHeader());
@@ -32,7 +32,14 @@ class OffReader {
             job_.note(fmt::format("dropped: points in a mesh of triangles ({})", points_));
         if (faceColours_ > 0)
             job_.note(fmt::format("dropped: colours of faces ({})", faceColours_));
-        builder_.materials().push_back({.name = "default", .hasColour = false});
+        if (unsaid_ > 0)
+            job_.note(
+                fmt::format("dropped: numbers behind the coordinates of vertices ({}); where "
+                            "they are colours the first line says COFF",
+                            unsaid_));
+        const int place = part_.uvs.empty() ? -1 : files_.placeOfColour(builder_.textures());
+        builder_.materials().push_back(
+            {.name = "default", .baseColourTexture = place, .hasColour = false});
         part_.where = "OFF";
         if (!part_.points) weldVertices(part_);
         STX_CHECK(builder_.add(std::move(part_)));
@@ -121,7 +128,7 @@ class OffReader {
 
     Result<void> readVertices() {
         STX_CHECK(builder_.charge(vertices_, 100, "the vertices"));
-        bool bytes = false;
+        constexpr float kNoAlpha = std::numeric_limits<float>::quiet_NaN();
         for (std::uint64_t i = 0; i < vertices_; ++i) {
             if (!nextLine())
                 return wrong("the file ends after {} of {} vertices; it is cut off", i, vertices_);
@@ -139,8 +146,10 @@ class OffReader {
                 part_.normals.emplace_back(normal[0], normal[1], normal[2]);
             }
             glm::vec2 uv(0);
-            glm::vec4 colour(1);
-            if (hasUvs_ || hasColours_) {
+            glm::vec4 colour(glm::vec3(1), kNoAlpha);
+            if (!hasUvs_ && !hasColours_) {
+                if (!line_.empty()) ++unsaid_;
+            } else {
                 std::vector<float> rest;
                 while (!line_.empty()) {
                     const auto value = nextNumber<double>();
@@ -156,17 +165,15 @@ class OffReader {
                                  !hasColours_ ? "2 are"
                                  : hasUvs_    ? "5 or 6 are"
                                               : "3 or 4 are");
-                for (std::size_t k = 0; k < ofColour; ++k) {
-                    colour[static_cast<int>(k)] = rest[k];
-                    bytes = bytes || rest[k] > 1;
-                }
-                if (bytes && ofColour == 3) colour.a = 255;
+                for (std::size_t k = 0; k < ofColour; ++k) colour[static_cast<int>(k)] = rest[k];
                 if (hasUvs_) uv = {rest[ofColour], 1 - rest[ofColour + 1]};  // v runs up here
             }
             if (hasColours_) part_.colours.push_back(colour);
             if (hasUvs_) part_.uvs.push_back(uv);
         }
         linearFromSrgbColours(part_.colours, true);
+        for (auto& c : part_.colours)
+            if (std::isnan(c.a)) c.a = 1;
         return {};
     }
 
@@ -185,6 +192,7 @@ class OffReader {
         std::vector<glm::dvec3> corners;
         std::vector<std::uint32_t> indices;
         std::vector<glm::uvec3> cut;
+        std::vector<bool> named(vertices_);  // as points
         std::uint64_t taken = 0;
         for (std::uint64_t f = 0; f < faces_; ++f) {
             if (!nextLine())
@@ -205,6 +213,7 @@ class OffReader {
             if (!line_.empty()) ++faceColours_;
             if (*count < 3) {
                 ++(*count == 1 ? points_ : lines_);
+                if (*count == 1) named[indices[0]] = true;
                 continue;
             }
             corners.clear();
@@ -219,23 +228,26 @@ class OffReader {
                 part_.triangles.emplace_back(indices[t.x], indices[t.y], indices[t.z]);
         }
         part_.points = part_.triangles.empty() && (points_ > 0 || faces_ == 0);
+        if (part_.points && faces_ > 0) keepVertices(part_, named);
         return {};
     }
 
     std::string_view left_, line_;
     std::uint64_t lineNumber_ = 0;
+    ModelFiles& files_;
     Job& job_;
     MeshBuilder builder_;
     MeshPart part_;
     bool hasUvs_ = false, hasColours_ = false, hasNormals_ = false, homogeneous_ = false;
     std::uint64_t vertices_ = 0, faces_ = 0;
     std::uint64_t lines_ = 0, points_ = 0, faceColours_ = 0;
+    std::uint64_t unsaid_ = 0;  ///< vertices with more numbers than the first line says
 };
 
 }  // namespace
 
-Result<Mesh> readOff(ByteSpan bytes, Job& job) {
-    return OffReader(bytes, job).read();
+Result<Mesh> readOff(ByteSpan bytes, ModelFiles& files) {
+    return OffReader(bytes, files).read();
 }
 
 }  // namespace stx

@@ -143,7 +143,15 @@ class PlyReader {
         return v;
     }
 
-    /// Length of a list, held against what the file can still hold.
+    /// What is cut off at the end of a line is no element whose lists are empty.
+    Result<void> begin(const PlyElement& element, std::uint64_t i) {
+        if (values_.beginElement()) return {};
+        return fail(ErrorCode::invalidInput, "{} {} of {}: the file ends; it is cut off",
+                    element.name, i, element.count);
+    }
+
+    /// Length of a list, held against what the file can still hold. Text may leave out those at
+    /// the end of a line that are empty.
     Result<std::size_t> length(const PlyElement& element, std::uint64_t i, const PlyProperty& p) {
         if (values_.atLineEnd()) return 0;
         STX_TRY(const double n, value(element, i, p.countType));
@@ -155,7 +163,7 @@ class PlyReader {
 
     Result<void> skip(const PlyElement& element) {
         for (std::uint64_t i = 0; i < element.count; ++i) {
-            values_.beginElement();
+            STX_CHECK(begin(element, i));
             for (const auto& p : element.properties) {
                 std::size_t n = 1;
                 if (p.isList) STX_SET(n, length(element, i, p));
@@ -198,7 +206,7 @@ class PlyReader {
         for (std::uint64_t i = 0; i < element.count; ++i) {
             std::array<double, 16> v{};
             v[static_cast<std::size_t>(Role::alpha)] = 1.0;
-            values_.beginElement();
+            STX_CHECK(begin(element, i));
             for (std::size_t k = 0; k < roles.size(); ++k) {
                 const auto& p = element.properties[k];
                 if (p.isList) {
@@ -246,7 +254,7 @@ class PlyReader {
             cornerUvs.clear();
             Face face;
             glm::dvec4 colour(1.0);
-            values_.beginElement();
+            STX_CHECK(begin(element, i));
             for (const auto& p : element.properties) {
                 const auto role = roleOf(p, true);
                 std::size_t n = 1;
@@ -331,11 +339,7 @@ class PlyReader {
         if (!header_.textureFiles.empty() && !hasUvs)
             files_.job().note("the PLY file names a texture but has no texture coordinates for it");
         auto& materials = builder_.materials();
-        int place = -1;  // of the caller's texture
-        if (hasUvs && hasPlainFaces_ && files_.replacesColour()) {
-            place = 0;
-            builder_.textures().push_back({Rgba8Image(1, 1)});
-        }
+        const int place = hasUvs ? files_.placeOfColour(builder_.textures()) : -1;
         for (const auto& name : header_.textureFiles) {
             Material m{.name = name, .baseColourTexture = place, .hasColour = false};
             if (hasUvs && !files_.replacesColour())

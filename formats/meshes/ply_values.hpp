@@ -25,9 +25,10 @@ class PlyValues {
 
     /// Text has one element a line: blank lines before it do not count, and what its properties
     /// leave of its line is passed over (MeshLab writes values there that its header does not
-    /// name).
-    void beginElement() {
+    /// name). False where nothing follows any more.
+    bool beginElement() {
         while (coding_ == PlyCoding::ascii && at_ < bytes_.size() && isBlank(byte())) ++at_;
+        return at_ < bytes_.size();
     }
     void endElement() {
         if (coding_ != PlyCoding::ascii) return;

@@ -10,11 +10,11 @@ namespace stx {
 // One reader per family of formats; readMesh() in meshes.cpp chooses. Contracts as readMesh().
 
 [[nodiscard]] Result<Mesh> readGltf(ByteSpan bytes, ModelFiles& files);
-[[nodiscard]] Result<Mesh> readDraco(ByteSpan bytes, Job& job);
+[[nodiscard]] Result<Mesh> readDraco(ByteSpan bytes, ModelFiles& files);
 
 [[nodiscard]] Result<Mesh> readPly(ByteSpan bytes, ModelFiles& files);
 
-[[nodiscard]] Result<Mesh> readOff(ByteSpan bytes, Job& job);
+[[nodiscard]] Result<Mesh> readOff(ByteSpan bytes, ModelFiles& files);
 
 enum class AssimpFormat { obj, stl, dae, fbx };
 /// OBJ, STL, COLLADA and FBX. `fileName` is the model's own name in its folder.

@@ -65,12 +65,9 @@ std::optional<std::string> SideFiles::readFound(const std::string& file,
         return std::nullopt;
     }
     if (auto text = utf8FromMarked(*bytes)) *bytes = std::move(*text);
-    if (!hasMaterialFile_) {
-        const auto folder = path.parent_path().lexically_relative(files_.folder());
-        if (folder != ".") materialFolder_ = folder.generic_string();
-    }
     hasMaterialFile_ = true;
-    auto plain = plainMtl(textOf(*bytes), materials_);
+    const auto folder = path.parent_path().lexically_relative(files_.folder());
+    auto plain = plainMtl(textOf(*bytes), folder == "." ? "" : folder.generic_string(), materials_);
     if (const auto count = plain.unread.size(); count > 0)
         files_.job().note(fmt::format("material file '{}', {}: the line is left out{}", file,
                                       plain.unread[0],

@@ -26,8 +26,6 @@ class SideFiles {
     [[nodiscard]] const std::optional<Error>& error() const { return error_; }
     /// The first name that does not exist beside the model, and why; empty when all do.
     [[nodiscard]] const std::string& missing() const { return missing_; }
-    /// Folder of the first material file, relative to the model's; empty when it is the same.
-    [[nodiscard]] const std::string& materialFolder() const { return materialFolder_; }
     /// Whether a material file was opened, and the materials of all, by name.
     [[nodiscard]] bool hasMaterialFile() const { return hasMaterialFile_; }
     [[nodiscard]] const std::map<std::string, MtlMaterial>& materials() const { return materials_; }
@@ -40,7 +38,6 @@ class SideFiles {
     ModelFiles& files_;
     std::optional<Error> error_;
     std::string missing_;
-    std::string materialFolder_;
     bool hasMaterialFile_ = false;
     std::map<std::string, MtlMaterial> materials_;
     std::set<std::string> opened_;  ///< paths of side files

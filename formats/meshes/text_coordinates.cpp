@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "formats/files/text_encoding.hpp"
+#include "formats/meshes/vertex_colours.hpp"
 #include "lib/geometry/origin.hpp"
 #include "lib/model/strays.hpp"
 
@@ -16,16 +18,22 @@ namespace {
 struct CoordinateLine {
     glm::dvec3 position{0.0};
     std::string_view rest;
-    bool coloured = false;  ///< the rest is r g b
-    double brightest = 0;   ///< of these
+    std::optional<glm::vec3> colour;  ///< the rest is r g b
 };
 
+/// What doubles cannot hold is 0 or infinite, as Assimp has it.
 bool takeNumber(std::string_view& text, double& value) {
     while (!text.empty() && isBlank(text.front())) text.remove_prefix(1);
     if (text.starts_with('+')) text.remove_prefix(1);
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || !std::isfinite(value)) return false;
-    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+    const auto number = text.substr(0, static_cast<std::size_t>(end - text.data()));
+    if (error == std::errc::result_out_of_range) {
+        const bool tiny = number.find('-', 1) != std::string_view::npos;  // the exponent's
+        value = tiny ? 0 : std::numeric_limits<double>::infinity();
+    } else if (error != std::errc()) {
+        return false;
+    }
+    text.remove_prefix(number.size());
     return text.empty() || isBlank(text.front());
 }
 
@@ -39,14 +47,14 @@ std::optional<CoordinateLine> parse(std::string_view values) {
     line.rest = trimmed(values);
     double w = 1;
     if (auto last = line.rest; !last.empty() && takeNumber(last, w) && trimmed(last).empty()) {
-        if (!(std::abs(w) > 0)) return std::nullopt;
+        if (w == 0) return std::nullopt;
         line.position /= w;
         line.rest = {};
     }
     double colour[3] = {};
     auto numbers = line.rest;
-    line.coloured = std::ranges::all_of(colour, [&](double& c) { return takeNumber(numbers, c); });
-    if (line.coloured) line.brightest = *std::ranges::max_element(colour);
+    if (std::ranges::all_of(colour, [&](double& c) { return takeNumber(numbers, c); }))
+        line.colour = glm::vec3(colour[0], colour[1], colour[2]);
     return line;
 }
 
@@ -98,57 +106,74 @@ std::optional<Bytes> plainObj(ByteSpan bytes) {
                        isBlank(line[1]);
         }
         continued = line.ends_with('\\');
-        if (!values && !elements) continue;
         // To the line's end: another point, another comment may be far away.
         const auto upTo = text.substr(0, end);
+        const auto last = continued ? upTo.rfind('\\') : end;
+        if (!values && !elements) {
+            // Names may have a #, so what is behind one stays.
+            if (!continued || line.find('#') == std::string_view::npos) continue;
+            replace(last, last + 1, " ");
+            continued = false;
+            continue;
+        }
         const auto comment = std::min(upTo.find('#', start), end);
         for (auto at = upTo.find('.', start); at < comment; at = upTo.find('.', at + 1)) {
             const bool first = at == start || isBlank(text[at - 1]);
             if (first && at + 1 < end && isDigit(text[at + 1])) replace(at, at, "0");
         }
-        if (comment == end) continue;
-        replace(comment, end, "");
-        continued = false;
+        if (comment < end) {
+            replace(comment, end, "");
+            continued = false;
+        } else if (values && continued) {
+            replace(last, std::min(end + 1, text.size()), " ");
+        }
     }
     if (copied == 0) return std::nullopt;
     append(out, text.substr(copied));
     return out;
 }
 
-std::optional<PlainText> plainCoordinates(ByteSpan bytes, std::string_view keyword) {
+PlainText plainCoordinates(ByteSpan bytes, std::string_view keyword) {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    std::vector<glm::dvec3> positions;
-    std::size_t coloured = 0;
-    double brightest = 0;
-    const bool understood = eachLine(text, keyword, [&](auto, const auto& values) {
+    PlainText out;
+    std::vector<glm::dvec3> positions;  // that are a place
+    std::size_t vertices = 0, coloured = 0;
+    ColourRange range;
+    eachLine(text, keyword, [&](std::string_view whole, const auto& values) {
         if (!values) return true;
         const auto line = parse(*values);
-        if (!line) return false;
-        positions.push_back(line->position);
-        coloured += line->coloured ? 1 : 0;
-        brightest = std::max(brightest, line->brightest);
+        if (!line) {
+            out.unread = trimmed(whole);
+            return false;
+        }
+        ++vertices;
+        const glm::vec3 p(line->position);
+        if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z))
+            positions.push_back(line->position);
+        if (!line->colour) return true;
+        ++coloured;
+        range.add(*line->colour);
         return true;
     });
-    if (!understood) return std::nullopt;
+    if (!out.unread.empty()) return out;
     const auto strays = findStrays(positions.size(), [&](std::uint64_t i) {
         return Piece{positions[i], positions[i]};
     });
-    PlainText out;
     out.origin = originFor(strays.bounds);
-    const bool mixed = coloured > 0 && coloured < positions.size();
-    if (out.origin == glm::dvec3(0.0) && !mixed) return std::nullopt;
-    // Colours are 0..1, or 0..255 as linearFromSrgbColours() finds.
-    const std::string_view white = brightest > 1 ? "255 255 255" : "1 1 1";
-    out.text.reserve(text.size() + positions.size() * 8);
+    const bool mixed = coloured > 0 && coloured < vertices;
+    if (out.origin == glm::dvec3(0.0) && !mixed) return out;
+    const std::string_view white = range.isBytes() ? "255 255 255" : "1 1 1";
+    auto& plain = out.text.emplace();
+    plain.reserve(text.size() + vertices * 8);
     eachLine(text, keyword, [&](std::string_view line, const auto& values) {
         if (!values) {
-            append(out.text, line);
+            append(plain, line);
             return true;
         }
         const auto parsed = *parse(*values);
         const glm::vec3 p(parsed.position - out.origin);
-        const auto rest = mixed && !parsed.coloured ? white : parsed.rest;
-        append(out.text, fmt::format("{} {} {} {} {}\n", keyword, p.x, p.y, p.z, rest));
+        const auto rest = mixed && !parsed.colour ? white : parsed.rest;
+        append(plain, fmt::format("{} {} {} {} {}\n", keyword, p.x, p.y, p.z, rest));
         return true;
     });
     return out;

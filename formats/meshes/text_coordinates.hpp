@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include <glm/glm.hpp>
@@ -11,14 +12,17 @@ namespace stx {
 
 /// A model's text whose lines of coordinates Assimp reads as they are meant.
 struct PlainText {
-    Bytes text;
-    glm::dvec3 origin{0.0};  ///< is subtracted from the coordinates
+    std::optional<Bytes> text;  ///< nothing where all is fine as it is
+    glm::dvec3 origin{0.0};     ///< is subtracted from the coordinates
+    std::string unread;         ///< the first line that is not understood: all stays as it is
 };
 
 /// OBJ text as Assimp reads what it means; nothing when it is so already:
 ///  - The numbers of `v`, `vt`, `vn` have a digit before their point: `.5`, which Wavefront's
 ///    specification allows, becomes `0.5`, since Assimp counts words that begin with a digit or a
 ///    sign only.
+///  - They do not go on in the next line.
+///  - No comment does either: one ends where its line does, also behind a backslash.
 ///  - Nothing is behind them and behind `f`, `l`, `p`: Assimp takes a comment there for a corner.
 [[nodiscard]] std::optional<Bytes> plainObj(ByteSpan text);
 
@@ -29,8 +33,7 @@ struct PlainText {
 ///    them too large.
 ///  - It gives the k-th colour to the k-th vertex, also where vertices before it have none. So
 ///    vertices without a colour become white when others have one.
-/// Nothing when all is fine, or when a line is not understood (then Assimp says what is wrong with
-/// it).
-[[nodiscard]] std::optional<PlainText> plainCoordinates(ByteSpan text, std::string_view keyword);
+/// Vertices that are at no finite place stay so, and have no say in this.
+[[nodiscard]] PlainText plainCoordinates(ByteSpan text, std::string_view keyword);
 
 }  // namespace stx

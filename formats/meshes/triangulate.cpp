@@ -93,11 +93,9 @@ class CornerGrid {
     std::vector<std::vector<std::uint32_t>> squares_;
 };
 
-}  // namespace
-
-void triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& triangles) {
+/// Of three corners or more.
+void cut(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& triangles) {
     const auto n = static_cast<std::uint32_t>(corners.size());
-    if (n < 3) return;
     std::vector<std::uint32_t> rest(n), next(n), previous(n);
     for (std::uint32_t i = 0; i < n; ++i) {
         rest[i] = i;
@@ -139,6 +137,24 @@ void triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& t
     }
     std::rotate(rest.begin(), std::ranges::min_element(rest), rest.end());
     fan(rest, triangles);
+}
+
+}  // namespace
+
+void triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& triangles) {
+    const std::size_t n = corners.size();
+    if (n < 3) return;
+    // A corner that is there twice is no ear, and keeps its neighbours from being one.
+    std::vector<std::uint32_t> apart;
+    for (std::uint32_t i = 0; i < n; ++i)
+        if (corners[i] != corners[(i + 1) % n]) apart.push_back(i);
+    if (apart.size() == n || apart.size() < 3) return cut(corners, triangles);
+    std::vector<glm::dvec3> places;
+    places.reserve(apart.size());
+    for (const auto i : apart) places.push_back(corners[i]);
+    const std::size_t before = triangles.size();
+    cut(places, triangles);
+    for (auto& t : std::span(triangles).subspan(before)) t = {apart[t.x], apart[t.y], apart[t.z]};
 }
 
 }  // namespace stx

@@ -9,7 +9,8 @@ namespace stx {
 
 /// Cuts a simple polygon, flat or nearly so, convex or not, into triangles of its corner numbers,
 /// in its own winding. Convex polygons become fans, others lose one ear after the other; what does
-/// not form a simple polygon still gives corners - 2 triangles.
+/// not form a simple polygon still gives corners - 2 triangles. Corners at the place of the next
+/// one do not count, unless fewer than three are left.
 void triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& triangles);
 
 }  // namespace stx

@@ -7,10 +7,25 @@
 
 namespace stx {
 
+void ColourRange::add(glm::vec3 colour) {
+    for (int k = 0; k < 3; ++k) {
+        if (!std::isfinite(colour[k])) continue;
+        largest_ = std::max(largest_, colour[k]);
+        whole_ = whole_ && colour[k] == std::floor(colour[k]);
+    }
+}
+
+bool ColourRange::isBytes() const {
+    // Colours of 0..1 are a little above 1 where they were rounded or sharpened, and some times as
+    // bright as white where they are light. Bytes that are dark throughout are whole.
+    constexpr float kBrightestLight = 16;
+    return largest_ > (whole_ ? 1.0f : kBrightestLight);
+}
+
 void linearFromSrgbColours(std::vector<glm::vec4>& colours, bool mayBeBytes) {
-    bool bytes = false;
-    for (const auto& c : colours) bytes = bytes || c.r > 1.0f || c.g > 1.0f || c.b > 1.0f;
-    const float scale = bytes && mayBeBytes ? 1.0f / 255.0f : 1.0f;
+    ColourRange range;
+    for (const auto& c : colours) range.add(glm::vec3(c));
+    const float scale = mayBeBytes && range.isBytes() ? 1.0f / 255.0f : 1.0f;
     float largestAlpha = 0;
     for (const auto& c : colours) largestAlpha = std::max(largestAlpha, c.a);
     const float alphaScale = scale != 1.0f && largestAlpha > 1.0f ? scale : 1.0f;

@@ -53,7 +53,7 @@ struct Mesh {
     /// would round them (see originFor()). All else here and in lib counts from it.
     glm::dvec3 origin{0.0};
     std::vector<glm::vec3> positions;  ///< scene units, +Y up
-    std::vector<glm::vec3> normals;    ///< unit
+    std::vector<glm::vec3> normals;    ///< unit; 0 of points and unused vertices that have none
     std::vector<glm::vec4> tangents;   ///< xyz unit, w = handedness (only with normal maps)
     std::vector<glm::vec4> colours;    ///< linear RGBA, multiplies the base colour
     std::vector<glm::vec2> uvs;  ///< of the base colour texture, its transform applied; v down

@@ -18,7 +18,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const int kind = data[0] % 10;
     if (kind == 6) {
         std::map<std::string, MtlMaterial> materials;
-        (void)plainMtl({reinterpret_cast<const char*>(from), size - 1}, materials);
+        (void)plainMtl({reinterpret_cast<const char*>(from), size - 1}, "", materials);
         return 0;
     }
     Job job;

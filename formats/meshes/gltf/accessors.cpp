@@ -95,6 +95,17 @@ Result<void> checkRange(ByteSpan bytes, std::uint64_t offset, std::uint64_t coun
 
 }  // namespace
 
+void AccessorValues::keep(const std::vector<bool>& kept) {
+    AccessorValues out;
+    out.components = components;
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+        if (!kept[i]) continue;
+        ++out.count;
+        for (int c = 0; c < components; ++c) out.values.push_back(at(i, c));
+    }
+    *this = std::move(out);
+}
+
 struct GltfFile::Layout {
     std::string where;
     std::uint64_t componentType = 0;

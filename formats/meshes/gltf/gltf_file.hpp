@@ -31,6 +31,8 @@ struct AccessorValues {
         return values[element * static_cast<std::size_t>(components) +
                       static_cast<std::size_t>(component)];
     }
+    /// Leaves the other elements out.
+    void keep(const std::vector<bool>& kept);
 };
 
 /// A glTF 2.0 or GLB file: its JSON, its buffers (loaded when first used), its accessors.

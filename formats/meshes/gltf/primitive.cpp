@@ -206,8 +206,10 @@ class PrimitiveReader {
         STX_CHECK(readMaterial());
         STX_CHECK(readInfluences());
         STX_CHECK(applyMorph(model_, primitive_, where_, morphWeights, part(), dropped_));
-        part().points = mode_ == 0;
-        if (mode_ != 0) STX_CHECK(readTriangles());
+        if (mode_ == 0)
+            STX_CHECK(readPoints());
+        else
+            STX_CHECK(readTriangles());
         return std::move(result_);
     }
 
@@ -309,28 +311,45 @@ class PrimitiveReader {
         return {};
     }
 
-    Result<void> readTriangles() {
-        if (attributes_.draco()) {
-            part().triangles = attributes_.draco()->triangles();
-            return {};
-        }
+    /// Numbers of vertices; nothing where all count as they come.
+    Result<std::optional<std::vector<std::uint32_t>>> readIndices() {
         STX_TRY(const auto accessor, getUint(primitive_, "indices", where_));
-        if (!accessor) {
-            STX_CHECK(builder_.charge(count_, sizeof(glm::uvec3), where_));
-            part().triangles = assemble(
-                mode_, count_, [](std::size_t i) { return static_cast<std::uint32_t>(i); });
-            return {};
-        }
-        STX_TRY(const auto indices, model_.indices(*accessor, where_ + " indices"));
+        if (!accessor) return std::nullopt;
+        STX_TRY(auto indices, model_.indices(*accessor, where_ + " indices"));
         for (std::size_t i = 0; i < indices.size(); ++i)
             if (indices[i] >= count_)
                 return fail(ErrorCode::invalidInput,
                             "accessors[{}] ({} indices): index {} is vertex {}, but there are "
                             "only {} vertices",
                             *accessor, where_, i, indices[i], count_);
-        STX_CHECK(builder_.charge(indices.size(), sizeof(glm::uvec3), where_));
-        part().triangles =
-            assemble(mode_, indices.size(), [&](std::size_t i) { return indices[i]; });
+        return indices;
+    }
+
+    Result<void> readPoints() {
+        part().points = true;
+        STX_TRY(const auto indices, readIndices());
+        if (!indices) return {};
+        std::vector<bool> named(count_);
+        for (const auto i : *indices) named[i] = true;
+        keepVertices(part(), named);
+        for (auto& influence : result_.influences) {
+            influence.joints.keep(named);
+            influence.weights.keep(named);
+        }
+        return {};
+    }
+
+    Result<void> readTriangles() {
+        if (attributes_.draco()) {
+            part().triangles = attributes_.draco()->triangles();
+            return {};
+        }
+        STX_TRY(const auto indices, readIndices());
+        const auto count = indices ? indices->size() : count_;
+        STX_CHECK(builder_.charge(count, sizeof(glm::uvec3), where_));
+        part().triangles = assemble(mode_, count, [&](std::size_t i) {
+            return indices ? (*indices)[i] : static_cast<std::uint32_t>(i);
+        });
         return {};
     }
 

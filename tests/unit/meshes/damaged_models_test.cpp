@@ -55,6 +55,14 @@ TEST(Off, AllThatTheFormatHas) {
     ASSERT_EQ(coloured.mesh.uvs.size(), 3u);
     EXPECT_EQ(coloured.mesh.uvs[0], glm::vec2(0.25f, 0.75f));
     EXPECT_TRUE(coloured.hasNote("dropped: lines (1)"));
+    const std::string vertices =
+        "3 1 0\n0 0 0 255 0 0 255\n1 0 0 9 9 9\n0 1 0 0 0 255 51\n3 0 1 2\n";
+    const auto alphas = readGoodText("COFF\n" + vertices, "a.off").mesh.colours;
+    ASSERT_EQ(alphas.size(), 3u);
+    expectNear(glm::vec3(alphas[0].a, alphas[1].a, alphas[2].a), {1, 1, 0.2f});
+    EXPECT_TRUE(readGoodText("OFF\n" + vertices, "a.off")
+                    .hasNote("dropped: numbers behind the coordinates of vertices (3); where they "
+                             "are colours the first line says COFF"));
 
     EXPECT_EQ(readGoodText("4OFF\n3 1 0\n0 0 0 2\n2 0 0 2\n0 2 0 2\n3 0 1 2\n", "a.off")
                   .mesh.bounds()
@@ -75,6 +83,21 @@ TEST(DamagedStl, ATextWithoutItsEndIsCutOff) {
     for (const auto& text :
          {kStl, kStl + kStl.substr(8, 60), kStl + "endsolid a\n" + kStl.substr(0, 100)})
         expectInvalid(readBadText(text, "a.stl"), "ends without 'endsolid'");
+}
+
+TEST(DamagedPly, ATextThatEndsWithALineIsCutOff) {
+    const std::string head =
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty "
+        "float z\nelement face 2\nproperty list uchar int vertex_indices\nproperty list uchar "
+        "float texcoord\nend_header\n0.000000 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+    // Lists that are left out at the end of a line are empty, of the last line, too.
+    EXPECT_EQ(readGoodText(head + "3 0 1 2\n3 0 2 3", "a.ply").mesh.triangles.size(), 2u);
+    for (const std::string end : {"3 0 1 2\n", "3 0 1 2", "3 0 1 2\n \r\n"})
+        expectInvalid(readBadText(head + end, "a.ply"),
+                      "face 1 of 2: the file ends; it is cut off");
+    expectInvalid(readBadText(head, "a.ply"), "face 0 of 2: the file ends; it is cut off");
+    expectInvalid(readBadText(head.substr(0, head.size() - 6), "a.ply"),
+                  "vertex 3 of 4: the file ends; it is cut off");
 }
 
 /// Twenty thousand times the same name: the file is read once.

@@ -70,6 +70,25 @@ TEST(Triangulate, SoDoThoseOfManyCorners) {
     expectTriangulated(arc);
 }
 
+TEST(Triangulate, CornersThatAreThereTwiceChangeNothing) {
+    const std::vector<glm::dvec3> notched = {
+        {1, 1, 0}, {0, 0, 0}, {-1, 1, 0}, {-1, -1, 0}, {1, -1, 0}};
+    std::vector<glm::uvec3> plain;
+    triangulate(notched, plain);
+    ASSERT_EQ(plain.size(), 3u);
+    for (std::size_t k = 0; k <= notched.size(); ++k) {
+        auto corners = notched;
+        corners.insert(corners.begin() + static_cast<std::ptrdiff_t>(k), 2,
+                       notched[k % notched.size()]);
+        std::vector<glm::uvec3> triangles;
+        triangulate(corners, triangles);
+        ASSERT_EQ(triangles.size(), plain.size()) << k;
+        for (std::size_t i = 0; i < plain.size(); ++i)
+            for (int c = 0; c < 3; ++c)
+                EXPECT_EQ(corners[triangles[i][c]], notched[plain[i][c]]) << k;
+    }
+}
+
 TEST(Triangulate, NonsenseStillEnds) {
     std::vector<glm::dvec3> corners(50, glm::dvec3(1));
     std::vector<glm::uvec3> triangles;
@@ -291,6 +310,60 @@ TEST(Clouds, PointsThatAreNowhereAreSkippedAndCounted) {
     gltf.root["meshes"][0]["primitives"].push_back(
         {{"attributes", {{"POSITION", position}}}, {"mode", 0}});
     EXPECT_EQ(readGoodText(gltf.text(), "a.gltf").mesh.points.size(), 2u);
+}
+
+TEST(Clouds, VerticesThatAreNotNamedAreNoPoints) {
+    const std::string obj = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 1\n";
+    const auto one = readGoodText(obj + "p 3\nl 1 2 4\n", "a.obj");
+    ASSERT_EQ(one.mesh.points.size(), 1u);
+    EXPECT_EQ(one.mesh.positions[one.mesh.points[0]], glm::vec3(1, 1, 0));
+    EXPECT_EQ(one.mesh.colours[one.mesh.points[0]], glm::vec4(0, 0, 1, 1));
+    EXPECT_EQ(readGoodText(obj + "p 1 2\n", "a.obj").mesh.points.size(), 2u);
+    EXPECT_EQ(readGoodText(obj, "a.obj").mesh.points.size(), 4u) << "a cloud";
+
+    const std::string off = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+    const auto named = readGoodText(off + "1 2\n2 0 1\n", "a.off");
+    ASSERT_EQ(named.mesh.points.size(), 1u);
+    EXPECT_EQ(named.mesh.positions[named.mesh.points[0]], glm::vec3(1, 1, 0));
+
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.primitive()["mode"] = 0;
+    gltf.primitive()["indices"] =
+        gltf.accessor(std::vector<std::uint16_t>{3, 1, 3}, 5123, "SCALAR", 3);
+    const auto two = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(two.mesh.points.size(), 2u);
+    EXPECT_EQ(two.mesh.positions[two.mesh.points[0]], glm::vec3(1, 0, 0));
+    EXPECT_EQ(two.mesh.positions[two.mesh.points[1]], glm::vec3(0, 1, 0));
+    gltf.primitive()["indices"] = gltf.accessor(std::vector<std::uint16_t>{4}, 5123, "SCALAR", 1);
+    EXPECT_NE(readBadText(gltf.text(), "a.gltf").text().find("index 0 is vertex 4"),
+              std::string::npos);
+}
+
+TEST(Clouds, NormalsThatPointsDoNotHaveAreNotInvented) {
+    const std::string header =
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty "
+        "float z\nproperty float nx\nproperty float ny\nproperty float nz\nend_header\n";
+    const auto some = readGoodText(header + "0 0 0 nan nan nan\n1 0 0 0 2 0\n", "a.ply");
+    ASSERT_EQ(some.mesh.normals.size(), 2u);
+    EXPECT_EQ(some.mesh.normals[0], glm::vec3(0));
+    EXPECT_EQ(some.mesh.normals[1], glm::vec3(0, 1, 0));
+    EXPECT_TRUE(some.hasNote("PLY: 1 normals are no directions; these points have none"));
+    const auto none = readGoodText(header + "0 0 0 0 0 0\n1 0 0 0 0 0\n", "a.ply");
+    EXPECT_TRUE(none.mesh.normals.empty());
+    EXPECT_TRUE(none.hasNote("PLY: 2 normals are no directions; these points have none"));
+
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.addQuad();
+    auto& primitives = gltf.root["meshes"][0]["primitives"];
+    primitives[0]["attributes"]["NORMAL"] =
+        gltf.accessor(std::vector<float>{1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0}, 5126, "VEC3", 4);
+    primitives[1]["mode"] = 0;
+    const auto beside = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(beside.mesh.points.size(), 4u);
+    EXPECT_EQ(beside.mesh.normals.at(beside.mesh.triangles.at(0).x), glm::vec3(1, 0, 0));
+    for (const auto p : beside.mesh.points) EXPECT_EQ(beside.mesh.normals.at(p), glm::vec3(0));
 }
 
 /// The colour of each point, as sRGB.

@@ -269,6 +269,14 @@ TEST(Gltf, SkinIgnoresItsNodeAndFollowsItsJoints) {
     expectNear(mesh.positions.at(0), {0, 0, 0});
     expectNear(mesh.positions.at(2), {1, 1, 4});  // joint 1: +5 after -1
     expectNear(mesh.positions.at(3), {0, 1, 2});  // half of both
+    // So do the points that indices name.
+    gltf.primitive()["mode"] = 0;
+    gltf.primitive()["indices"] =
+        gltf.accessor(std::vector<std::uint16_t>{3, 2}, 5123, "SCALAR", 2);
+    const auto points = readGoodText(gltf.text(), "a.gltf").mesh;
+    ASSERT_EQ(points.points.size(), 2u);
+    expectNear(points.positions.at(points.points[0]), {1, 1, 4});
+    expectNear(points.positions.at(points.points[1]), {0, 1, 2});
 }
 
 TEST(Gltf, GpuInstancesAreExpanded) {

@@ -1,7 +1,9 @@
 #include <array>
+#include <cmath>
 #include <ctime>
 
 #include "formats/meshes/text_coordinates.hpp"
+#include "formats/meshes/vertex_colours.hpp"
 #include "lib/capture/material_sampler.hpp"
 #include "tests/unit/meshes/models.hpp"
 
@@ -26,12 +28,14 @@ TEST(Mtl, AlphaMapIsTheAlphaOfTheTexture) {
     EXPECT_EQ(plain.baseColour, glm::vec4(0, 0, 1, 1));
 }
 
-/// A triangle of three corners with `first`, then one with `second` behind the coordinates.
-std::array<glm::vec4, 2> coloursOfTwo(const std::string& first, const std::string& second) {
+/// A triangle of three corners with `first`, then one with `second` behind the coordinates; and
+/// `more` lines.
+std::array<glm::vec4, 2> coloursOfTwo(const std::string& first, const std::string& second,
+                                      const std::string& more = "") {
     std::string text;
     for (int i = 0; i < 6; ++i)
         text += fmt::format("v {} {} {} {}\n", i % 3 / 2, i % 3 % 2, i / 3, i < 3 ? first : second);
-    const auto model = readGoodText(text + "f 1 2 3\nf 4 5 6\n", "a.obj");
+    const auto model = readGoodText(text + more + "f 1 2 3\nf 4 5 6\n", "a.obj");
     EXPECT_TRUE(model.notes.empty()) << model.notes[0];
     EXPECT_EQ(model.mesh.triangles.size(), 2u);
     const MaterialSampler sampler(model.mesh);
@@ -47,6 +51,68 @@ TEST(Obj, VerticesWithoutAColourAreWhiteBesideColoured) {
     EXPECT_EQ(coloursOfTwo("0 0 255", ""), (Two{blue, white})) << "bytes";
     EXPECT_EQ(coloursOfTwo("0 0 1", "0 1 0"), (Two{blue, green}));
     EXPECT_EQ(coloursOfTwo("# plain", "0 1 0"), (Two{white, green})) << "a comment";
+    for (const std::string line : {"v nan nan nan", "v 1e999 -inf 1e-999", "v 1 \\\n 2 \\\r\n3"})
+        EXPECT_EQ(coloursOfTwo("", "0 1 0", line + "\n"), (Two{white, green})) << line;
+}
+
+TEST(Obj, ColoursALittleAbove1AreNoBytes) {
+    const auto isBytes = [](std::initializer_list<glm::vec3> colours) {
+        ColourRange range;
+        for (const auto& colour : colours) range.add(colour);
+        return range.isBytes();
+    };
+    EXPECT_FALSE(isBytes({{1, 0, 1}, {0, 0, 0}}));
+    EXPECT_FALSE(isBytes({{1, 0, 1}, {1.000001f, 0.5f, 0.25f}}));
+    EXPECT_FALSE(isBytes({{4.5f, 0.5f, 3}})) << "light";
+    EXPECT_FALSE(isBytes({{HUGE_VALF, NAN, 1}}));
+    EXPECT_TRUE(isBytes({{2, 0, 1}})) << "dark ones";
+    EXPECT_TRUE(isBytes({{127.5f, 0.25f, 1}}));
+    const auto model = readGoodText(
+        "v 0 0 0 1 .5 .2\nv 1 0 0 1.000001 .5 .2\nv 0 1 0 1 .5 .2\nf 1 2 3\n", "a.obj");
+    expectNear(glm::vec3(colourOf(model.mesh)), {1, 0.5f, 0.2f}, 1e-3f);
+}
+
+/// A triangle in coordinates of a map, and a line more.
+ReadModel mapWith(const std::string& line) {
+    return readGoodText(
+        "v 500000.25 4600000.5 0\nv 500001.25 4600000.5 0\nv 500000.25 4600001.5 "
+        "0\n" +
+            line + "\nf 1 2 3\n",
+        "a.obj");
+}
+
+TEST(Obj, VerticesThatAreNowhereDoNotRoundTheOthers) {
+    for (const std::string line : {"v nan nan nan", "v 1e999 0 0", "v 5e5 \\\n4600000 0"}) {
+        const auto model = mapWith(line);
+        ASSERT_EQ(model.mesh.positions.size(), 3u) << line;
+        EXPECT_NE(model.mesh.origin, glm::dvec3(0)) << line;
+        EXPECT_EQ(model.mesh.origin + glm::dvec3(model.mesh.positions[1]),
+                  glm::dvec3(500001.25, 4600000.5, 0))
+            << line;
+        EXPECT_FALSE(model.hasNote("the reader of this format rounds")) << line;
+    }
+    EXPECT_EQ(readGoodText("v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan nan nan\ns 1\nf 1 2 3\n", "a.obj")
+                  .mesh.normals.size(),
+              3u);
+}
+
+TEST(Obj, VerticesThatAreNotUnderstoodAreSaid) {
+    const auto model = mapWith(" v 1 2 ");
+    EXPECT_TRUE(model.hasNote(
+        "'v 1 2', expected 'v X Y Z': vertices are as Assimp takes them, their coordinates rounded "
+        "to 32-bit floats"));
+    EXPECT_TRUE(model.hasNote("to which the reader of this format rounds them"));
+}
+
+TEST(Obj, CommentsEndWithTheirLines) {
+    const std::string square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+    for (const std::string comment :
+         {"# from C:\\models\\\n", "\t#\\\r\n", "# a \\ \n", "g a # b\\\n"}) {
+        const auto model =
+            readGoodText(comment + square + comment + "s 1\n" + comment + "f 1 2 3 4\n", "a.obj");
+        EXPECT_EQ(model.mesh.positions.size(), 4u) << comment;
+        EXPECT_EQ(model.mesh.normals.size(), 4u) << comment << "its smoothing group";
+    }
 }
 
 TEST(Obj, NumbersThatBeginWithAPoint) {
@@ -245,6 +311,29 @@ TEST(Mtl, SeveralFilesOnALine) {
     EXPECT_EQ(coloursWith("gone.mtl lost.mtl"),
               "grey grey material file 'gone.mtl lost.mtl' cannot be read; its materials have no "
               "colour");
+}
+
+TEST(Mtl, TexturesAreThoseBesideTheirMaterialFile) {
+    TemporaryFolder folder;
+    for (const char* name : {"a", "b"}) {
+        std::filesystem::create_directories(folder / name);
+        write(folder / fmt::format("{0}/{0}.mtl", name),
+              fmt::format("newmtl {}\nmap_Kd tex.png\n", name));
+    }
+    writePair(folder / "a/tex.png", {255, 0, 0, 255}, {255, 0, 0, 255});
+    writePair(folder / "b/tex.png", {0, 0, 255, 255}, {0, 0, 255, 255});
+    write(folder / "m.obj",
+          "mtllib a/a.mtl\nmtllib b/b.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+          "usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 3/3 2/2 1/1\n");
+    const auto model = readGood(folder / "m.obj");
+    ASSERT_EQ(model.mesh.triangles.size(), 2u);
+    EXPECT_TRUE(model.notes.empty()) << model.notes[0];
+    const MaterialSampler sampler(model.mesh);
+    EXPECT_EQ(sampler.colour(0, glm::vec3(1.0f / 3.0f)), glm::vec4(1, 0, 0, 1));
+    EXPECT_EQ(sampler.colour(1, glm::vec3(1.0f / 3.0f)), glm::vec4(0, 0, 1, 1));
+    // One that both name is opened once.
+    writePair(folder / "tex.png", {0, 255, 0, 255}, {0, 255, 0, 255});
+    EXPECT_EQ(readGood(folder / "m.obj").mesh.textures.size(), 1u);
 }
 
 TEST(Obj, MaterialsThatNoFileHasAreSaidOnce) {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <fstream>
 
 #include "formats/images/images.hpp"
@@ -149,6 +150,51 @@ TEST_F(MovedModel, TheCallersTextureIsSampledAsTheOneThatItReplaces) {
     EXPECT_EQ(materialOf(2).baseColourTexture, -1) << "it has no coordinates";
     ASSERT_EQ(notes.size(), 1u);
     EXPECT_NE(notes[0].find("primitives[2] has a textured material but no"), std::string::npos);
+}
+
+/// The texture of the triangle in this plane, -1: none.
+int textureAt(const Mesh& mesh, float z) {
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+        if (mesh.positions[mesh.triangles[i].x].z == z)
+            return mesh.materials[mesh.triangleMaterial[i]].baseColourTexture;
+    ADD_FAILURE() << "no triangle in " << z;
+    return -1;
+}
+
+TEST_F(MovedModel, ObjectsWithoutCoordinatesAreNotPainted) {
+    writePicture("mine.png", {7, 8, 9, 255});
+    writePicture("home/model/spot_map.png", {3, 4, 5, 255});
+    const std::string objects =
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nvt 0 0\nvt 1 0\nvt 0 1\n"
+        "o painted\nf 1/1 2/2 3/3\no bare\nf 4 5 6\n";
+    const auto file = folder_ / "home/model/spot.obj";
+    write(file, objects);
+    for (const bool given : {false, true}) {
+        const auto model = readGood(file, {given ? folder_ / "mine.png" : std::filesystem::path()});
+        ASSERT_EQ(model.mesh.triangles.size(), 2u);
+        const int painted = textureAt(model.mesh, 0);
+        ASSERT_GE(painted, 0);
+        EXPECT_EQ(model.mesh.textures.at(static_cast<std::size_t>(painted)).pixels.at(0, 0).r,
+                  given ? 7 : 3);
+        EXPECT_EQ(textureAt(model.mesh, 1), -1);
+        EXPECT_TRUE(model.hasNote("mesh 'bare' has the textured material")) << given;
+        EXPECT_EQ(model.hasNote("'spot_map.png' beside it"), !given);
+    }
+    // A picture that cannot be read is none.
+    write(folder_ / "home/model/spot_map.png", "no picture");
+    const auto grey = readGood(file);
+    EXPECT_EQ(grey.notes.size(), 1u) << "the model has no colour";
+    EXPECT_TRUE(grey.mesh.textures.empty());
+    // Nor do they have the normal map of others.
+    write(folder_ / "home/model/spot.mtl", "newmtl bumpy\nKd 1 0 0\nnorm beside.png\n");
+    write(file, "mtllib spot.mtl\nusemtl bumpy\n" + objects);
+    const auto bumpy = readGood(file);
+    EXPECT_TRUE(bumpy.hasNote("mesh 'bare' has the textured material 'bumpy' but no texture"));
+    const auto maps = [&](std::size_t i) {
+        return bumpy.mesh.materials.at(bumpy.mesh.triangleMaterial.at(i)).normalTexture;
+    };
+    EXPECT_EQ(std::min(maps(0), maps(1)), -1);
+    EXPECT_EQ(std::max(maps(0), maps(1)), 0);
 }
 
 TEST_F(MovedModel, PlyFacesWithoutATextureAreNotPainted) {
