@@ -81,6 +81,7 @@ class KeptRenderer final : public Renderer {
 
     Result<Frame> render(const Camera& camera) override { return renderer_->render(camera); }
     void expect(const Camera& next) override { renderer_->expect(next); }
+    void lightFrom(const std::optional<Camera>& pose) override { renderer_->lightFrom(pose); }
     void reuse(Frame&& frame) override { renderer_->reuse(std::move(frame)); }
     std::string backend() const override { return renderer_->backend(); }
     std::string device() const override { return renderer_->device(); }

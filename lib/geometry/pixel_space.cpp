@@ -18,14 +18,23 @@ constexpr double kMostAcross = 10;
 /// and 16: at steep rims links follow chords, which lie beside the surface.
 constexpr double kFinePixel = 1.0 / 100.0;
 
+/// A depth range as wide as the window makes shares of it mean what they do in perspective.
+double orthographicRange(const Camera& c, double across) {
+    const double window = std::max(c.width / c.fx, c.height / c.fy);
+    return kOrthographicRange * std::clamp(across, window, kMostAcross * window);
+}
+
 }  // namespace
+
+ShareLength::ShareLength(const Camera& camera, double radius)
+    : most_(kMostRadii * radius), orthographic_(camera.orthographic) {
+    if (orthographic_) most_ = std::min(most_, orthographicRange(camera, radius));
+}
 
 PixelSpace::PixelSpace(const Camera& c, double farthest, double across) : camera(c) {
     axis.inverse = !c.orthographic;
     if (c.orthographic) {
-        // A depth range as wide as the window makes shares of it mean what they do in perspective.
-        const double window = std::max(c.width / c.fx, c.height / c.fy);
-        axis.unit = kOrthographicRange * std::clamp(across, window, kMostAcross * window);
+        axis.unit = orthographicRange(c, across);
         axis.origin = farthest + axis.unit;
     }
     axis.pixel = 1.0 / std::max(c.fx, c.fy);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 
@@ -8,6 +9,29 @@
 #include "lib/geometry/camera.hpp"
 
 namespace stx {
+
+/// Shares of a distance are of no more than so many times the scene's radius: from farther away,
+/// with a narrower field of view, they would be more than the scene is deep. Ten models from 60
+/// radii, whose holes are filled by such shares: 38.3 -> 43.4 dB, alike with 8 and 24. Nearer eyes,
+/// which see all of the scene in more than 7.2 degrees, change nothing.
+inline constexpr double kMostRadii = 16.0;
+
+/// What the shares of a distance are of that tell surfaces apart in a camera's picture, scene
+/// units.
+class ShareLength {
+  public:
+    /// `radius`: of the scene.
+    ShareLength(const Camera& camera, double radius);
+    /// At a distance: that itself, as far as kMostRadii lets it. Of an orthographic camera, whose
+    /// picture is the same from any distance, what depths of a PixelSpace are shares of.
+    [[nodiscard]] double at(double distance) const {
+        return orthographic_ ? most_ : std::min(distance, most_);
+    }
+
+  private:
+    double most_;
+    bool orthographic_;
+};
 
 /// The depth coordinate q in which planes are affine over the image, larger = nearer, 0 = no point.
 /// Perspective: q = 1 / dist. Orthographic: q = (origin - dist) / unit, at least 1 on the scene.

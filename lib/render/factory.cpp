@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "lib/model/view_table.hpp"
 #include "lib/refine/refine_depth.hpp"
 #include "lib/render/compose/behind.hpp"
 #include "lib/render/compose/environment_behind.hpp"
@@ -225,9 +226,28 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
     if (environment) settings.fill = Fill::none;
     STX_TRY(auto made, makePlain(backend, drawn, settings, device, job));
     if (settings.does(Stage::footprint) && isOurs(backend, settings))
-        made = withFootprint(std::move(made), drawn, settings.log, job);
+        made = withFootprint(std::move(made), drawn, settings, job);
     if (environment) made = withEnvironment(std::move(made), environment);
     return made;
+}
+
+/// checkPeak() of what an atlas is drawn from: its pages, or views that are made of them.
+Result<void> checkPeakOf(const PeakMemory& drawing, const Atlas& atlas, const Limits& limits) {
+    const AtlasPage& first = atlas.pages[0];
+    const ViewImageKinds kinds{first.texture.isLinear(),
+                               !first.normal.empty(),
+                               !first.splatU.empty(),
+                               !first.splatV.empty(),
+                               !first.metallicRoughness.empty(),
+                               !first.emissive.empty()};
+    std::uint64_t inPages = 0, inViews = 0;
+    for (const AtlasPage& page : atlas.pages) inPages += page.depth.count();
+    if (!atlas.paddingHolds(PageSet::kPadding))
+        for (const ReferenceView& view : atlas.views)
+            inViews += static_cast<std::uint64_t>(view.camera.width) *
+                       static_cast<std::uint64_t>(view.camera.height);
+    const std::uint64_t drawn = inViews > 0 ? inViews : inPages;
+    return checkPeak(drawing, drawn, drawn, (inPages + inViews) * kinds.bytesPerPixel(), limits);
 }
 
 }  // namespace
@@ -289,6 +309,7 @@ Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Atlas& atl
                                                const RenderSettings& settings, int device,
                                                Job& job) {
     STX_TRY(const PageSet set, PageSet::of(atlas, job));
+    STX_CHECK(checkPeakOf(drawingMemory(settings), atlas, job.limits));
     return makeFrom(backend, set, settings, atlas.environment, device, job);
 }
 

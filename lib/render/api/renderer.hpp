@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "lib/base/job.hpp"
@@ -89,12 +90,24 @@ class Renderer {
     /// Says that frames are averaged by so much along each side from now on (1 = not at all), and
     /// that what is finer need not be guessed.
     virtual void averagedBy(int factor) { (void)factor; }
+    /// Says that lights that move with the camera (Light::inCameraSpace) are where this pose has
+    /// them from now on, whichever camera is drawn; nullopt: where each camera has them.
+    virtual void lightFrom(const std::optional<Camera>& pose) { lightPose_ = pose; }
     /// Takes a frame that is not needed any more; its memory may serve for the next one.
     virtual void reuse(Frame&& frame) { (void)frame; }
     /// "cpu", "gpu" or "gl".
     [[nodiscard]] virtual std::string backend() const = 0;
     /// GL_RENDERER, or the processor's name and the SIMD target in use.
     [[nodiscard]] virtual std::string device() const = 0;
+
+  protected:
+    /// The pose whose lights a camera's picture has.
+    [[nodiscard]] const Camera& lightPose(const Camera& camera) const {
+        return lightPose_ ? *lightPose_ : camera;
+    }
+
+  private:
+    std::optional<Camera> lightPose_;
 };
 
 /// A device that Backend::gpu and gl can use.

@@ -88,13 +88,11 @@ std::vector<Camera> facesAround(const Camera& pose, int half) {
     return faces;
 }
 
-Result<Frame> renderAround(Renderer& renderer, const Camera& camera, int width, int height,
-                           Job& job) {
-    if (width < 4 || width != 2 * height)
-        return fail(ErrorCode::usage,
-                    "a picture all around has {}x{} pixels; twice as wide as high is expected, 4x2 "
-                    "at least",
-                    width, height);
+namespace {
+
+/// renderAround() without its checks, in the light that the renderer has.
+Result<Frame> drawAround(Renderer& renderer, const Camera& camera, int width, int height,
+                         Job& job) {
     const auto cameras = facesAround(camera, facesHalf(width));
     std::vector<glm::vec2> column(static_cast<std::size_t>(width));  // sine, cosine of longitude
     for (int x = 0; x < width; ++x) {
@@ -140,6 +138,22 @@ Result<Frame> renderAround(Renderer& renderer, const Camera& camera, int width, 
         });
     }
     return out;
+}
+
+}  // namespace
+
+Result<Frame> renderAround(Renderer& renderer, const Camera& camera, int width, int height,
+                           Job& job) {
+    if (width < 4 || width != 2 * height)
+        return fail(ErrorCode::usage,
+                    "a picture all around has {}x{} pixels; twice as wide as high is expected, 4x2 "
+                    "at least",
+                    width, height);
+    // Lights that move with the camera are where its pose has them, not each face.
+    renderer.lightFrom(camera);
+    auto frame = drawAround(renderer, camera, width, height, job);
+    renderer.lightFrom(std::nullopt);
+    return frame;
 }
 
 namespace {

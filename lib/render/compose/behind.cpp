@@ -32,6 +32,10 @@ class BackgroundRenderer final : public Renderer {
         front_->expect(next);
         background_->expect(next);
     }
+    void lightFrom(const std::optional<Camera>& pose) override {
+        front_->lightFrom(pose);
+        background_->lightFrom(pose);
+    }
     void reuse(Frame&& frame) override { front_->reuse(std::move(frame)); }
     std::string backend() const override { return front_->backend(); }
     std::string device() const override { return front_->device(); }

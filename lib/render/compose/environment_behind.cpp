@@ -23,6 +23,7 @@ class EnvironmentRenderer final : public Renderer {
         return frame;
     }
     void expect(const Camera& next) override { inner_->expect(next); }
+    void lightFrom(const std::optional<Camera>& pose) override { inner_->lightFrom(pose); }
     void reuse(Frame&& frame) override { inner_->reuse(std::move(frame)); }
     std::string backend() const override { return inner_->backend(); }
     std::string device() const override { return inner_->device(); }

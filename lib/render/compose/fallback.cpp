@@ -20,12 +20,17 @@ class FallbackRenderer final : public Renderer {
                               current_->backend(), frame.error().text(), second->backend()));
         current_ = std::move(second);
         current_->averagedBy(factor_);
+        current_->lightFrom(lights_);
         return current_->render(camera);
     }
     void expect(const Camera& next) override { current_->expect(next); }
     void averagedBy(int factor) override {
         factor_ = factor;
         current_->averagedBy(factor);
+    }
+    void lightFrom(const std::optional<Camera>& pose) override {
+        lights_ = pose;
+        current_->lightFrom(pose);
     }
     void reuse(Frame&& frame) override { current_->reuse(std::move(frame)); }
     std::string backend() const override { return current_->backend(); }
@@ -35,7 +40,8 @@ class FallbackRenderer final : public Renderer {
     std::unique_ptr<Renderer> current_;
     std::function<Result<std::unique_ptr<Renderer>>()> makeSecond_;
     Job& job_;
-    int factor_ = 1;  ///< see averagedBy()
+    int factor_ = 1;                ///< see averagedBy()
+    std::optional<Camera> lights_;  ///< see lightFrom()
 };
 
 }  // namespace

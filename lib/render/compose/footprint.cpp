@@ -27,8 +27,14 @@ constexpr std::uint64_t kBytesEach = 64;
 class FootprintRenderer final : public Renderer {
   public:
     FootprintRenderer(std::unique_ptr<Renderer> inner, const PageSet& set,
-                      std::shared_ptr<StageLog> log, Job& job)
-        : inner_(std::move(inner)), set_(set), footprint_(set), log_(std::move(log)), job_(job) {}
+                      const RenderSettings& settings, Job& job)
+        : inner_(std::move(inner)),
+          set_(set),
+          footprint_(set),
+          radius_(set.bounds().radius()),
+          lit_(settings.lighting.on()),
+          log_(settings.log),
+          job_(job) {}
 
     Result<Frame> render(const Camera& camera) override {
         STX_CHECK(camera.check());
@@ -38,7 +44,7 @@ class FootprintRenderer final : public Renderer {
         if (!large_) return inner_->render(camera);
         STX_TRY(Frame large, inner_->render(enlarged(camera, factor)));
         StageTimer timer(log_.get(), "footprint");
-        Frame out = minified(large, factor);
+        Frame out = minified(large, factor, ShareLength(camera, radius_));
         timer.changed(static_cast<std::int64_t>(out.depth.count()));
         inner_->reuse(std::move(large));
         return out;
@@ -46,6 +52,7 @@ class FootprintRenderer final : public Renderer {
     void expect(const Camera& next) override {
         if (next.check()) inner_->expect(enlarged(next, factorOf(next)));
     }
+    void lightFrom(const std::optional<Camera>& pose) override { inner_->lightFrom(pose); }
     void reuse(Frame&& frame) override {
         // Beside a larger one, which is kept already, it is of no use.
         if (!large_) inner_->reuse(std::move(frame));
@@ -59,9 +66,9 @@ class FootprintRenderer final : public Renderer {
     }
     [[nodiscard]] int factorOf(const Camera& camera) const {
         // In sets of mixed resolution a small view's own pose looks like a reduced picture of the
-        // large ones; renderers return it exactly.
-        if (std::any_of(set_.views().begin(), set_.views().end(),
-                        [&](const PageView& v) { return sameCamera(v.camera, camera); }))
+        // large ones; renderers return it exactly, but for its light.
+        if (!lit_ && std::any_of(set_.views().begin(), set_.views().end(),
+                                 [&](const PageView& v) { return sameCamera(v.camera, camera); }))
             return 1;
         int factor = footprint_.factor(camera);
         const double pixels = static_cast<double>(camera.width) * camera.height;
@@ -86,6 +93,8 @@ class FootprintRenderer final : public Renderer {
     std::unique_ptr<Renderer> inner_;
     PageSet set_;
     Footprint footprint_;
+    double radius_;
+    bool lit_;
     std::shared_ptr<StageLog> log_;
     Job& job_;
     bool large_ = false;  ///< the last frame came from a larger one
@@ -140,22 +149,23 @@ int Footprint::factor(const Camera& camera) const {
 
 namespace {
 
-/// The middle four of the pixels that become one are one surface within this share of their depth,
-/// as samples of a pixel are (kOneSurface of shaders/shared/surface_constants.glsl).
-constexpr float kOneDepth = 0.01f;
+/// The middle four of the pixels that become one are one surface within this share of the
+/// ShareLength at their depth, as samples of a pixel are within one of q (kOneSurface of
+/// shaders/shared/surface_constants.glsl).
+constexpr double kOneDepth = 0.01;
 
 /// Depth where four pixels meet: their mean where they are one surface, else the first of them that
 /// has a point.
-float depthAmid(const std::array<float, 4>& d) {
+float depthAmid(const std::array<float, 4>& d, const ShareLength& shares) {
     const auto [least, most] = std::minmax_element(d.begin(), d.end());
-    if (*least > 0.0f && hasPoint(*most) && *most - *least <= kOneDepth * *least)
+    if (*least > 0.0f && hasPoint(*most) && *most - *least <= kOneDepth * shares.at(*least))
         return 0.25f * ((d[0] + d[3]) + (d[1] + d[2]));
     const auto first = std::find_if(d.begin(), d.end(), hasPoint);
     return first == d.end() ? kNoDepth : *first;
 }
 
 /// A row of minified() by 2 of colour and depth alone, which is what most pictures are.
-void halveRow(const Frame& large, int y, Frame& out) {
+void halveRow(const Frame& large, int y, const ShareLength& shares, Frame& out) {
     const float* above = &large.colour.row(2 * y).data()->x;
     const float* below = &large.colour.row(2 * y + 1).data()->x;
     const float* depthAbove = large.depth.row(2 * y).data();
@@ -170,13 +180,13 @@ void halveRow(const Frame& large, int y, Frame& out) {
         for (int c = 0; c < 4; ++c) colour[c] = sum[c] * 0.25f;
         const std::array<float, 4> d{depthAbove[2 * x], depthAbove[2 * x + 1], depthBelow[2 * x],
                                      depthBelow[2 * x + 1]};
-        depth[x] = std::ranges::count_if(d, hasPoint) >= 2 ? depthAmid(d) : kNoDepth;
+        depth[x] = std::ranges::count_if(d, hasPoint) >= 2 ? depthAmid(d, shares) : kNoDepth;
     }
 }
 
 }  // namespace
 
-Frame minified(const Frame& large, int factor) {
+Frame minified(const Frame& large, int factor, const ShareLength& shares) {
     const int width = large.colour.width() / factor, height = large.colour.height() / factor;
     Frame out;
     out.linear = large.linear;
@@ -213,7 +223,7 @@ Frame minified(const Frame& large, int factor) {
             const auto at = [&](int i, int j) {
                 return large.depth.at(x * factor + middle - 1 + i, y * factor + middle - 1 + j);
             };
-            const float amid = depthAmid({at(0, 0), at(1, 0), at(0, 1), at(1, 1)});
+            const float amid = depthAmid({at(0, 0), at(1, 0), at(0, 1), at(1, 1)}, shares);
             if (hasPoint(amid)) depth = amid;
         }
         out.colour.at(x, y) = colour * share;
@@ -225,7 +235,7 @@ Frame minified(const Frame& large, int factor) {
     const bool plain = factor == 2 && large.albedo.empty() && large.normal.empty();
     parallelFor(0, height, 16, [&](int y) {
         if (plain) {
-            halveRow(large, y, out);
+            halveRow(large, y, shares, out);
             return;
         }
         for (int x = 0; x < width; ++x) pixel(x, y);
@@ -234,8 +244,8 @@ Frame minified(const Frame& large, int factor) {
 }
 
 std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner, const PageSet& set,
-                                        std::shared_ptr<StageLog> log, Job& job) {
-    return std::make_unique<FootprintRenderer>(std::move(inner), set, std::move(log), job);
+                                        const RenderSettings& settings, Job& job) {
+    return std::make_unique<FootprintRenderer>(std::move(inner), set, settings, job);
 }
 
 }  // namespace stx

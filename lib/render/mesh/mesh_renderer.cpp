@@ -26,7 +26,7 @@ Result<Frame> MeshRenderer::render(const Camera& camera) {
     RasterSettings raster;
     raster.supersampling = 4;
     raster.normals = true;
-    raster.lighting = lightsInWorld(settings_.lighting, camera.worldFromCamera());
+    raster.lighting = lightsInWorld(settings_.lighting, lightPose(camera).worldFromCamera());
     STX_TRY(auto image, rasterise(mesh_, camera, raster, job_));
     Frame frame;
     frame.colour = std::move(image.colour);

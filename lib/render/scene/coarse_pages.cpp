@@ -30,13 +30,17 @@ glm::dvec3 sightOf(const Camera& camera, glm::dvec3 point) {
 /// How far apart the samples of a view are on the surface that it sees at a pixel, which it may see
 /// from aside; infinity where no neighbour is on that surface.
 double stepAt(const PageSet& set, std::size_t view, int u, int v) {
+    const Camera& camera = set.views()[view].camera;
     const double found = set.depth(view, u, v);
-    // Of the two sides of an axis one may be beyond an edge.
-    const auto rise = [&](int i, int j) {
-        return std::min(std::abs(set.depth(view, u + i, v + j) - found),
-                        std::abs(set.depth(view, u - i, v - j) - found));
+    const auto riseTo = [&](int x, int y) {
+        const bool inside = x >= 0 && y >= 0 && x < camera.width && y < camera.height;
+        return std::abs((inside ? set.depth(view, x, y) : kNoDepth) - found);
     };
-    return spacingAt(set.views()[view].camera, found) + std::max(rise(1, 0), rise(0, 1));
+    // Of the two sides of an axis one may be beyond an edge, or beyond the view.
+    const auto rise = [&](int i, int j) {
+        return std::min(riseTo(u + i, v + j), riseTo(u - i, v - j));
+    };
+    return spacingAt(camera, found) + std::max(rise(1, 0), rise(0, 1));
 }
 
 /// A pixel of a coarse view.

@@ -33,15 +33,17 @@ bool samePixel(const PageSet& set, std::size_t a, std::size_t b, int x, int y) {
 bool samePicture(const PageSet& set, std::size_t a, std::size_t b) {
     const Camera& c = set.views()[a].camera;
     const double pixels = static_cast<double>(c.width) * c.height;
-    const int step = std::max(1, static_cast<int>(std::sqrt(pixels / kComparedPixels)));
-    std::int64_t compared = 0, different = 0;
-    for (int y = step / 2; y < c.height; y += step) {
-        for (int x = step / 2; x < c.width; x += step) {
-            ++compared;
-            different += !samePixel(set, a, b, x, y);
-        }
-    }
-    return static_cast<double>(different) <= kMayDiffer * static_cast<double>(compared);
+    const int step = std::clamp(static_cast<int>(std::sqrt(pixels / kComparedPixels)), 1,
+                                std::min(c.width, c.height));
+    const auto compared = [step](int size) { return (size - 1 - step / 2) / step + 1; };
+    const double mayDiffer = kMayDiffer * compared(c.width) * compared(c.height);
+    // Of many views from one place each is held against all others: those that are not the same
+    // tell it soon.
+    int different = 0;
+    for (int y = step / 2; y < c.height; y += step)
+        for (int x = step / 2; x < c.width; x += step)
+            if (!samePixel(set, a, b, x, y) && ++different > mayDiffer) return false;
+    return true;
 }
 
 }  // namespace

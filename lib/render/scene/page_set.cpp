@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/depth_values.hpp"
 #include "lib/packing/packing.hpp"
 
 namespace stx {
@@ -204,19 +205,20 @@ std::int64_t PageSet::pointCount() const {
 
 Bounds PageSet::bounds() const {
     if (data_->bounds) return *data_->bounds;
-    Bounds bounds;
-    for (const PageRectangle& r : rectangles()) {
+    std::vector<Bounds> each(rectangles().size());
+    parallelFor(0, each.size(), [&](std::int64_t k) {
+        const PageRectangle& r = rectangles()[k];
+        const PageView& view = views()[r.view];
         const Image<float>& depth = *pages()[r.page].depth;
-        const Camera& c = r.window;
-        for (int j = 0; j < r.height; ++j) {
-            for (int i = 0; i < r.width; ++i) {
-                const float dist = depth.at(r.pageX + i, r.pageY + j);
-                if (hasPoint(dist))
-                    bounds.add(c.position + c.orientation * c.unproject(i + 0.5, j + 0.5, dist));
-            }
-        }
-    }
-    return bounds;
+        if (view.unread)
+            each[k] = view.unread->bounds;
+        else if (view.whole)
+            each[k] = boundsOfPoints(depth, r.window);
+        else
+            each[k] = boundsOfPoints(depth.part(r.pageX, r.pageY, r.width, r.height), r.window);
+        settle();
+    });
+    return boundsTogether(each);
 }
 
 Texture PageSet::textureOfView(std::size_t number) const {

@@ -162,7 +162,8 @@ class PageSet {
         return set;
     }
 
-    /// World bounds of all points: those that the file gives, else computed from the pixels.
+    /// World bounds of all points: those that the file gives, else computed from the pixels, and of
+    /// views without pixels what their summaries tell.
     [[nodiscard]] Bounds bounds() const;
 
     /// A rectangle from whose texels pixel (x, y) of a view can be read, padding included; null

@@ -47,15 +47,22 @@ PageSet PageSet::solid(bool& changed) const {
             continue;
         if (!data) data = std::make_shared<Data>(*data_);
         const auto near = widened(inside);
-        auto texture = std::make_shared<Texture>(*page.texture);
-        for (std::size_t p = 0; p < near.count(); ++p) {
-            if (near.data()[p] == 0 || !hasPoint(page.depth->data()[p])) continue;
-            if (auto* image = texture->rgba8()) image->data()[p].w = 255;
-            if (auto* image = texture->rgbaFloat()) image->data()[p].w = 1.0f;
-        }
-        texture->moveTo(spool());
-        data->pages[i].texture = texture.get();
-        data->changed.push_back(std::move(texture));
+        const auto opaque = [&](const Texture& from) {
+            auto texture = std::make_shared<Texture>(from);
+            for (std::size_t p = 0; p < near.count(); ++p) {
+                if (near.data()[p] == 0 || !hasPoint(page.depth->data()[p])) continue;
+                if (auto* image = texture->rgba8()) image->data()[p].w = 255;
+                if (auto* image = texture->rgbaFloat()) image->data()[p].w = 1.0f;
+            }
+            texture->moveTo(spool());
+            data->changed.push_back(texture);
+            return texture.get();
+        };
+        data->pages[i].texture = opaque(*page.texture);
+        // What was matched to others is opaque in its own colours, too.
+        if (!data->captured.empty())
+            data->captured[i] = data_->captured[i] == page.texture ? data->pages[i].texture
+                                                                   : opaque(*data_->captured[i]);
     }
     if (!data) return *this;
     changed = true;

@@ -10,9 +10,11 @@ namespace {
 
 // Where no source is named the value was chosen by trial on the project's image sets and meshes.
 
-// Relative depth behind the front that still belongs to it (Lee & Park blend all; 1 to 3 % is known
-// to be good): for blocks whose tilt is known, and for others.
-constexpr float kTolerance = 0.01f, kToleranceRough = 0.02f;
+// Depth behind the front that still belongs to it (Lee & Park blend all; 1 to 3 % is known to be
+// good), a share of the ShareLength: for blocks whose tilt is known, and for others.
+constexpr double kTolerance = 0.01, kToleranceRough = 0.02;
+// But no less of the distance than what rounding may tell apart: some steps of floats.
+constexpr double kLeastTolerance = 1e-6;
 // A block is smooth, and one tilt serves for all of it, when its tilts (tangents) spread less than
 // this and its farthest point is nearer than this many times the distance of the nearest.
 constexpr float kSmoothSlopes = 0.35f, kSmoothDepths = 1.2f;
@@ -135,6 +137,14 @@ Cells cellsOf(const BlockInfo& block, const RectangleImages& s, glm::dvec2 centr
     return all;
 }
 
+// As a share of the distance, which right before an orthographic eye would have no end.
+float toleranceOf(bool smooth, double farthest, const ShareLength& shares) {
+    const double shared = shares.at(farthest);
+    const double share = shared / std::max(farthest, kCrossing * shared);
+    return static_cast<float>(
+        std::max(kLeastTolerance, (smooth ? kTolerance : kToleranceRough) * share));
+}
+
 // The plane and the gradient of uniform splats, from the middle cell.
 void setSlopes(const Cells& cells, BlockTask& task) {
     task.slopeX = task.slopeY = 0;
@@ -178,7 +188,8 @@ bool setReach(const Corners& corners, bool crossing, double cover2, const Camera
 }  // namespace
 
 bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const RectangleImages& s,
-               const Camera& novel, bool cullBackFaces, BlockTask& task) {
+               const Camera& novel, const ShareLength& shares, bool cullBackFaces,
+               BlockTask& task) {
     task.u0 = block.u0;
     task.v0 = block.v0;
     task.u1 = block.u1;
@@ -197,7 +208,7 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
     task.uniform = task.small && cells.smooth && block.linked;
     task.core2 = static_cast<float>(std::max(kLeastCore2, kCornerRoom * cover2));
 
-    task.tolerance = cells.smooth ? kTolerance : kToleranceRough;
+    task.tolerance = toleranceOf(cells.smooth, corners.zMax, shares);
     setSlopes(cells, task);
 
     // Views that saw the surface close (dense samples) and head-on count more, and those that saw

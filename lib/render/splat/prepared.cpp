@@ -343,6 +343,7 @@ std::vector<BlockInfo> blocksOfRow(const Window& w, const PreparedPage& page, in
 
 PreparedPages preparePages(const PageSet& set, bool wantNormals) {
     PreparedPages out;
+    out.radius = set.bounds().radius();
     const bool splats = std::any_of(set.views().begin(), set.views().end(),
                                     [](const PageView& v) { return v.hasSplats; });
     std::uint32_t firstPoint = 0;

@@ -81,6 +81,7 @@ struct PreparedRectangle {
 struct PreparedPages {
     std::vector<PreparedPage> pages;
     std::vector<PreparedRectangle> rectangles;
+    double radius = 0;  ///< of the scene, scene units
 };
 
 /// Tilts from splatU x splatV, else the normals, else the neighbours' depths (never over a depth

@@ -98,7 +98,7 @@ class SurfaceRenderer final : public Renderer {
                                           Frame& frame, Image<float>& q);
     /// Those pixels of a frame, and perhaps others; its depth, too.
     [[nodiscard]] Result<Frame> drawPixels(const Camera& camera, std::vector<TilePixels> wanted);
-    /// The view that is exactly the camera's, -1 = none.
+    /// The view that is exactly the camera's, whose picture is its own pixels; -1 = none.
     [[nodiscard]] int viewAt(const Camera& camera) const;
     [[nodiscard]] Frame copyOf(const Source& source) const;
     void light(const Camera& camera, Frame& frame) const;
@@ -227,6 +227,8 @@ glm::vec3 SurfaceRenderer::normalAt(const Source& source, float u, float v) cons
 }
 
 int SurfaceRenderer::viewAt(const Camera& camera) const {
+    // Its pixels do not all have a place and a normal to be lit at: outlines would glow.
+    if (settings_.lighting.on()) return -1;
     for (std::size_t i = 0; i < scene_.sources.size(); ++i) {
         const Source& s = scene_.sources[i];
         const bool complete =
@@ -271,7 +273,8 @@ Frame SurfaceRenderer::copyOf(const Source& source) const {
 void SurfaceRenderer::light(const Camera& camera, Frame& frame) const {
     const StageTimer timer(settings_.log.get(), "light");
     const int width = frame.colour.width(), height = frame.colour.height();
-    const Lighting lighting = lightsInWorld(settings_.lighting, camera.worldFromCamera());
+    const Lighting lighting =
+        lightsInWorld(settings_.lighting, lightPose(camera).worldFromCamera());
     const glm::dmat3 worldFromCamera = glm::mat3_cast(camera.orientation);
     parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {

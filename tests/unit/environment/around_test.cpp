@@ -87,6 +87,41 @@ TEST(Around, ShowsEachDirectionAndTheLengthOfItsRay) {
     }
 }
 
+/// A light that moves with the camera is one light for all faces, not one for each.
+TEST(Around, HasTheLightsOfItsCamera) {
+    const Bundle bundle = room(facesHalf(128));
+    Camera pose;
+    pose.orientation = glm::angleAxis(0.9, glm::normalize(glm::dvec3(0.3, 1, 0.2)));
+    Light light{.kind = Light::Kind::directional, .vector = {0.3f, -0.2f, -1}};
+    RenderSettings inWorld;
+    inWorld.lighting.ambient = glm::vec3(0.1f);
+    inWorld.lighting.lights = {light};
+    inWorld.lighting.lights[0].vector =
+        glm::vec3(pose.orientation * glm::normalize(glm::dvec3(light.vector)));
+    RenderSettings moving = inWorld;
+    light.inCameraSpace = true;
+    moving.lighting.lights = {light};
+    for (const RenderMode mode : {RenderMode::surface, RenderMode::splat}) {
+        inWorld.mode = moving.mode = mode;
+        Job job;
+        const auto one = makeRenderer(Backend::cpu, bundle, inWorld, -1, job);
+        const auto other = makeRenderer(Backend::cpu, bundle, moving, -1, job);
+        ASSERT_TRUE(one && other);
+        const auto a = renderAround(**one, pose, 128, 64, job),
+                   b = renderAround(**other, pose, 128, 64, job);
+        ASSERT_TRUE(a && b);
+        float most = 0;
+        for (std::size_t i = 0; i < a->colour.count(); ++i)
+            most = std::max(most, glm::distance(a->colour.data()[i], b->colour.data()[i]));
+        EXPECT_LT(most, 1e-3f);
+        // Pictures that follow have their own lights again.
+        const Camera face = facesAround(pose, 16)[2];
+        const auto fresh = makeRenderer(Backend::cpu, bundle, moving, -1, job);
+        ASSERT_TRUE(fresh);
+        EXPECT_EQ((*other)->render(face)->colour, (*fresh)->render(face)->colour);
+    }
+}
+
 TEST(Around, RefusesOtherShapes) {
     const Bundle bundle = room(16);
     Job job;

@@ -134,5 +134,35 @@ TEST(CoarsePages, AreLeftOutOfAtlases) {
     EXPECT_EQ(points, mixed.views.back().pointCount());
 }
 
+/// Beyond the border of a view lies nothing of it: packed, what was read there is in no page, and
+/// it crashed.
+TEST(CoarsePages, TheBorderOfAViewHasNeighboursOnOneSide) {
+    Bundle walls;
+    for (const auto& [side, lens] : {std::pair{64, 64.0}, std::pair{128, 256.0}}) {
+        ReferenceView& view = walls.views.emplace_back();
+        view.name = fmt::format("{}", side);
+        view.camera.position = {0, 0, 4};
+        view.camera.width = view.camera.height = side;
+        view.camera.fx = view.camera.fy = lens;
+        view.camera.cx = view.camera.cy = side / 2.0;
+        view.nearPlane = 3.9;
+        view.farPlane = 4.1;
+        view.texture = Rgba8Image(side, side, glm::u8vec4(255));
+        view.depth = Image<float>(side, side, 4.0f);
+    }
+    // The fine view shows the middle half of the other.
+    constexpr std::int64_t kShown = 32 * 32;
+    std::int64_t points = 0;
+    EXPECT_EQ(PageSet(walls).withoutCoarse(points).views().size(), 2u);
+    EXPECT_EQ(points, kShown);
+    Job job;
+    const auto atlas = pack(walls, {}, job);
+    ASSERT_TRUE(atlas);
+    const auto set = PageSet::of(*atlas, job);
+    ASSERT_TRUE(set);
+    EXPECT_EQ(set->withoutCoarse(points).views().size(), 2u);
+    EXPECT_EQ(points, kShown);
+}
+
 }  // namespace
 }  // namespace stx

@@ -73,5 +73,19 @@ TEST_F(DistinctPages, AnotherPictureOfTheSameCameraStays) {
     EXPECT_EQ(kept(more), more.views.size());
 }
 
+/// A thousandth may differ, of 64x64 pixels four: it is counted no further than that.
+TEST_F(DistinctPages, AFewPixelsMayDiffer) {
+    Bundle more = views;
+    more.views.push_back(more.views[0]);
+    Image<float>& depth = more.views.back().depth;
+    int changed = 0;
+    for (std::size_t i = 0; i < depth.count() && changed < 5; ++i) {
+        if (!hasPoint(depth.data()[i])) continue;
+        depth.data()[i] *= 1.01f;
+        EXPECT_EQ(kept(more), views.views.size() + (++changed > 4 ? 1 : 0)) << changed;
+    }
+    EXPECT_EQ(changed, 5);
+}
+
 }  // namespace
 }  // namespace stx

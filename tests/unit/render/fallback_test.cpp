@@ -23,7 +23,12 @@ class Failing final : public Renderer {
 
 class Steady final : public Renderer {
   public:
-    Result<Frame> render(const Camera&) override { return Frame{}; }
+    /// Its time is where lights stand of the camera.
+    Result<Frame> render(const Camera& camera) override {
+        Frame frame;
+        frame.milliseconds = lightPose(camera).position.x;
+        return frame;
+    }
     std::string backend() const override { return "second"; }
     std::string device() const override { return "steady"; }
 };
@@ -48,6 +53,19 @@ TEST(Fallback, DrawsOnWithTheSecondAndSaysWhy) {
     const auto notes = job.takeNotes();
     ASSERT_EQ(notes.size(), 1u);
     EXPECT_NE(notes[0].find("the device was lost"), std::string::npos);
+}
+
+TEST(Fallback, DrawsOnInTheSameLight) {
+    Job job;
+    int made = 0;
+    const auto renderer =
+        withFallback(std::make_unique<Failing>(0, ErrorCode::failed), steady(made), job);
+    Camera pose;
+    pose.position.x = 7;
+    renderer->lightFrom(pose);
+    EXPECT_EQ(renderer->render({})->milliseconds, 7);
+    renderer->lightFrom(std::nullopt);
+    EXPECT_EQ(renderer->render({})->milliseconds, 0);
 }
 
 TEST(Fallback, PassesOtherErrorsOn) {

@@ -15,6 +15,8 @@ Camera smallCamera(int divisor) {
     return c.resized(c.width / divisor, c.height / divisor);
 }
 
+const ShareLength kNear(Camera(), 10);
+
 TEST(Footprint, CountsTheSamplesOfAPixel) {
     const Bundle bundle = analyticBundle(AnalyticScene::object, 8);
     const Footprint footprint(bundle);
@@ -39,7 +41,7 @@ TEST(Footprint, DepthIsThatAtThePixelsCentre) {
                         static_cast<float>(plane((x + 0.5) / factor, (y + 0.5) / factor));
             // In front of all else: an edge is not averaged.
             large.depth.at(2 * factor, 2 * factor) = 1;
-            const Frame small = minified(large, factor);
+            const Frame small = minified(large, factor, kNear);
             for (int y = 0; y < 6; ++y)
                 for (int x = 0; x < 8; ++x) {
                     if (x == 2 && y == 2) continue;
@@ -47,6 +49,31 @@ TEST(Footprint, DepthIsThatAtThePixelsCentre) {
                 }
             const float there = small.depth.at(2, 2);
             EXPECT_TRUE(there == 1 || std::abs(there - plane(2.5, 2.5)) < 0.03) << there;
+        }
+    }
+}
+
+/// 1 % of the distance is more than the scene is deep: two plates, one a little before the other,
+/// had a depth in the air between them.
+TEST(Footprint, DepthFromFarAwayIsOnOneOfTwoSurfaces) {
+    for (const bool orthographic : {false, true}) {
+        for (const double eye : {100.0, 1000.0}) {
+            Camera camera;
+            camera.orthographic = orthographic;
+            camera.width = camera.height = 8;
+            camera.fx = camera.fy = orthographic ? 2.5 : 2.5 * eye;
+            const auto nearer = static_cast<float>(eye - 0.3), farther = nearer + 0.6f;
+            for (const int factor : {2, 4}) {
+                Frame large;
+                large.colour = Image<glm::vec4>(8 * factor, 8 * factor, glm::vec4(1));
+                large.depth = Image<float>(8 * factor, 8 * factor, farther);
+                // The edge is in the middle of a pixel.
+                for (int y = 0; y < large.depth.height(); ++y)
+                    for (int x = 0; x < 4 * factor + factor / 2; ++x) large.depth.at(x, y) = nearer;
+                const Frame small = minified(large, factor, ShareLength(camera, 1.5));
+                for (const float depth : small.depth.pixels())
+                    EXPECT_TRUE(depth == nearer || depth == farther) << depth;
+            }
         }
     }
 }
@@ -113,7 +140,7 @@ TEST(Footprint, AveragesWhatIsThere) {
         large.depth.at(x, y) = 3.0f;
         large.normal.at(x, y) = glm::vec3(0, 0, 1);
     }
-    const Frame small = minified(large, 2);
+    const Frame small = minified(large, 2, kNear);
     ASSERT_EQ(small.colour.size(), glm::ivec2(2, 1));
     EXPECT_EQ(small.colour.at(0, 0), glm::vec4(0.25f, 0.5f, 0.125f, 0.5f));
     EXPECT_EQ(small.albedo.at(0, 0), glm::vec4(0.5f));
@@ -126,7 +153,7 @@ TEST(Footprint, AveragesWhatIsThere) {
     // The same of colour and depth alone, which has a loop of its own.
     large.albedo = {};
     large.normal = {};
-    const Frame plain = minified(large, 2);
+    const Frame plain = minified(large, 2, kNear);
     EXPECT_TRUE(plain.colour == small.colour && plain.depth == small.depth);
     EXPECT_TRUE(plain.albedo.empty() && plain.normal.empty());
 }

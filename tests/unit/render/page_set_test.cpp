@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/metrics/compare.hpp"
+#include "lib/model/view_table.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/prune.hpp"
 #include "lib/render/factory.hpp"
@@ -145,6 +146,61 @@ TEST_P(PageSets, GiveBackTheirViews) {
     const auto frame = (*renderer)->render(views.views[3].camera);
     ASSERT_TRUE(frame);
     EXPECT_EQ(frame->depth, views.views[3].depth);
+}
+
+/// As bundles are: those without room around their rectangles are made into one first.
+TEST_P(PageSets, AreHeldToTheMemoryLimit) {
+    if (GetParam().pruned && GetParam().padding >= PageSet::kPadding)
+        GTEST_SKIP() << "pages of pruned views take less than the views";
+    const auto pixels = static_cast<std::uint64_t>(views.views.size()) * 128 * 128;
+    job.limits.maxMemoryBytes = pixels * (ViewImageKinds::of(views.views[0]).bytesPerPixel() + 2);
+    const auto renderer = makeRenderer(Backend::cpu, atlas, {}, -1, job);
+    ASSERT_FALSE(renderer);
+    EXPECT_TRUE(renderer.error().message.starts_with("drawing with views of "))
+        << renderer.error().message;
+    job.limits.maxMemoryBytes *= 4;
+    EXPECT_TRUE(makeRenderer(Backend::cpu, atlas, {}, -1, job));
+}
+
+/// Walls with a pane of half alpha, from three places; one camera saw them darker.
+TEST(PageSet, WhatIsMadeOpaqueStaysSoAtItsOwnPoseWhenColoursWereMatched) {
+    constexpr int kSide = 64;
+    Bundle bundle;
+    for (const double x : {0.0, 0.2, -0.2}) {
+        ReferenceView& view = bundle.views.emplace_back();
+        view.name = fmt::format("{}", x);
+        view.camera.position = {x, 0, 4};
+        view.camera.width = view.camera.height = kSide;
+        view.camera.fx = view.camera.fy = kSide;
+        view.camera.cx = view.camera.cy = kSide / 2.0;
+        view.nearPlane = 3.9;
+        view.farPlane = 4.1;
+        view.depth = Image<float>(kSide, kSide, 4.0f);
+        view.texture = Rgba8Image(kSide, kSide);
+        for (int v = 0; v < kSide; ++v) {
+            for (int u = 0; u < kSide; ++u) {
+                const glm::dvec3 at = view.worldPoint(u, v);
+                const glm::dvec3 colour(120 + 60 * std::sin(5 * at.x),
+                                        120 + 60 * std::cos(4 * at.y),
+                                        100 + 50 * std::sin(3 * (at.x + at.y)));
+                const bool pane = u >= 20 && u < 44 && v >= 20 && v < 44;
+                view.texture.rgba8()->at(u, v) =
+                    glm::u8vec4(glm::u8vec3(colour * (x > 0 ? 0.7 : 1.0)), pane ? 128 : 255);
+            }
+        }
+    }
+    Job job;
+    RefineStepReport report;
+    (void)PageSet(bundle).inOneLight({}, report);
+    ASSERT_GT(report.views, 0);
+    const auto renderer = makeRenderer(Backend::cpu, bundle, {}, -1, job);
+    ASSERT_TRUE(renderer);
+    for (const ReferenceView& view : bundle.views) {
+        const auto frame = (*renderer)->render(view.camera);
+        ASSERT_TRUE(frame);
+        const glm::vec4 own = view.texture.at(32, 32), drawn = frame->colour.at(32, 32);
+        EXPECT_LT(glm::distance(drawn, glm::vec4(glm::vec3(own), 1.0f)), 1e-5f) << view.name;
+    }
 }
 
 constexpr auto kGrid = PackSettings::Layout::grid, kTight = PackSettings::Layout::tight;

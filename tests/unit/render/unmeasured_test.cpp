@@ -70,16 +70,20 @@ Bundle walls(NoDepth noDepth = NoDepth::unknown) {
     return bundle;
 }
 
-Frame drawn(const Bundle& bundle, const Camera& camera, RenderMode mode, bool unmeasured) {
+Frame drawn(const Bundle& bundle, const Camera& camera, const RenderSettings& settings) {
     Job job;
-    RenderSettings settings;
-    settings.mode = mode;
-    if (!unmeasured) settings.without.add(Stage::unmeasured);
     const auto renderer = makeRenderer(Backend::cpu, bundle, settings, -1, job);
     EXPECT_TRUE(renderer);
     auto frame = (*renderer)->render(camera);
     EXPECT_TRUE(frame);
     return std::move(*frame);
+}
+
+Frame drawn(const Bundle& bundle, const Camera& camera, RenderMode mode, bool unmeasured) {
+    RenderSettings settings;
+    settings.mode = mode;
+    if (!unmeasured) settings.without.add(Stage::unmeasured);
+    return drawn(bundle, camera, settings);
 }
 
 /// dB over R, G and B of pixels.
@@ -208,6 +212,33 @@ TEST(Unmeasured, TakesNothingFromWhatIsMeasured) {
             ASSERT_LT(std::max({d.x, d.y, d.z}), 1e-6f) << x << ", " << y;
         }
     }
+}
+
+/// A view's own pose, too: its holes shone, while the wall around them lay in the dark.
+TEST(Unmeasured, HolesInAWallAreLitAsTheWallIs) {
+    constexpr int kHole = 8, kAt = 10;
+    Bundle bundle = walls();
+    for (ReferenceView& view : bundle.views)
+        for (int y = kAt; y < kAt + kHole; ++y)
+            for (int x = kAt; x < kAt + kHole; ++x) view.depth.at(x, y) = kNoDepth;
+    RenderSettings settings;
+    settings.lighting.lights.push_back({.kind = Light::Kind::directional, .vector = {0, 0, 1}});
+    settings.lighting.ambient = glm::vec3(0.05f);
+    const Camera own = bundle.views[1].camera;
+    Camera beside = own;
+    beside.position.x += 1e-3;
+    const auto is = [&](const Frame& frame, int x, int y) {
+        return glm::vec3(frame.colour.at(x, y));
+    };
+    const Frame dark = drawn(bundle, own, settings), other = drawn(bundle, beside, settings),
+                plain = drawn(bundle, own, {});
+    for (int y = kAt; y < kAt + kHole; ++y)
+        for (int x = kAt; x < kAt + kHole; ++x) {
+            EXPECT_LT(glm::length(is(dark, x, y) - is(other, x, y)), 0.05f) << x << ", " << y;
+            EXPECT_LT(is(dark, x, y).r, 0.5f * is(plain, x, y).r) << x << ", " << y;
+        }
+    // The sky gives off its own.
+    EXPECT_LT(glm::length(is(dark, kWide / 2, kHigh / 2) - is(plain, kWide / 2, kHigh / 2)), 0.1f);
 }
 
 TEST(Unmeasured, EmptinessIsNotSky) {

@@ -337,6 +337,31 @@ TEST_P(GpuRenderers, FramesExpectedAreTheSame) {
     EXPECT_TRUE((*told)->render(cameras[1]));
 }
 
+TEST_P(GpuRenderers, FramesExpectedHaveTheLightsThatAreAskedFor) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 4, 2);
+    RenderSettings s = settings();
+    s.lighting.lights = {{Light::Kind::directional, {0, 0, -1}, glm::vec3(1), true}};
+    Job job;
+    auto plain = makeRenderer(Backend::gpu, bundle, s, -1, job);
+    auto told = makeRenderer(Backend::gpu, bundle, s, -1, job);
+    ASSERT_TRUE(plain && told);
+    const Camera first = analyticCamera(AnalyticScene::object, 0.2, 4),
+                 second = analyticCamera(AnalyticScene::object, 0.4, 4),
+                 pose = analyticCamera(AnalyticScene::object, 1.4, 4);
+    (*told)->expect(second);
+    ASSERT_TRUE((*told)->render(first));
+    const auto own = (*plain)->render(second);
+    for (auto* renderer : {&plain, &told}) (**renderer)->lightFrom(pose);
+    const auto a = (*plain)->render(second), b = (*told)->render(second);
+    ASSERT_TRUE(own && a && b);
+    EXPECT_GT(psnr(a->colour, b->colour), 90.0);
+    EXPECT_LT(psnr(a->colour, own->colour), 30.0);
+    (*told)->lightFrom(std::nullopt);
+    const auto again = (*told)->render(second);
+    ASSERT_TRUE(again);
+    EXPECT_GT(psnr(again->colour, own->colour), 90.0);
+}
+
 TEST_P(GpuRenderers, SayWhereTheyDraw) {
     const Bundle bundle = analyticBundle(AnalyticScene::object, 1);
     Job job;

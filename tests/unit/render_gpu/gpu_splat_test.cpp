@@ -84,6 +84,22 @@ TEST_P(GpuSplat, AgreesWithTheCpu) {
     }
 }
 
+/// Where what blends with the front is held to the scene.
+TEST_P(GpuSplat, AgreesWithTheCpuFromFarAway) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 5, 2);
+    for (const bool orthographic : {false, true}) {
+        Camera camera = analyticCamera(AnalyticScene::object, 0.4, 5);
+        const double distance = glm::length(camera.position);
+        camera.position *= 100.0;
+        camera.orthographic = orthographic;
+        camera.fx *= orthographic ? 1 / distance : 100.0;
+        camera.fy = camera.fx;
+        const auto frame = draw(bundle, splatSettings(), camera);
+        test::expectAgreement(frame, drawOnCpu(bundle, splatSettings(), camera),
+                              orthographic ? "orthographic" : "perspective");
+    }
+}
+
 TEST_P(GpuSplat, DrawsFramesLargerThanOnePiece) {
     const Bundle bundle = test::smallRoom(1, 64);
     Camera camera = bundle.views[0].camera.resized(4500, 40);

@@ -191,6 +191,43 @@ TEST(CpuSplat, TheFrontHidesTheBack) {
     }
 }
 
+/// From far away 1 % of the distance is more than the scene is deep: the plane behind was blended
+/// in. A blue plane, as large as all that its view sees of it, and half as far a red one.
+TEST(CpuSplat, TheFrontHidesTheBackFromFarAway) {
+    Bundle bundle;
+    const Camera view = cameraAt({0, 0, 0}, {0, 0, -1}, 96, 1.0);
+    for (const double distance : {6.0, 3.0})
+        bundle.views.push_back(planeView(view, distance, 0.0, [&](int, int) {
+            return distance > 3 ? glm::u8vec4(0, 0, 255, 255) : glm::u8vec4(255, 0, 0, 255);
+        }));
+    for (const bool orthographic : {false, true}) {
+        for (const double eye : {1.0, 300.0, 1e3, 1e5}) {
+            const double window = orthographic ? 2.0 : 2 * std::atan(1 / (eye + 3));
+            const Camera camera = cameraAt({0, 0, eye}, {0, 0, -3}, 64, window, orthographic);
+            const Frame frame = drawn(bundle, camera, splatSettings());
+            EXPECT_EQ(emptyPixels(frame), 0);
+            for (const glm::vec4& c : frame.colour.pixels())
+                ASSERT_EQ(c.b, 0) << eye << (orthographic ? " orthographic" : "");
+        }
+    }
+}
+
+TEST(CpuSplat, AnOrthographicPictureIsTheSameFromAnyDistance) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 9);
+    const auto from = [&](double distance) {
+        const glm::dvec3 eye = distance * glm::normalize(glm::dvec3(0.3, 0.5, 1));
+        return drawn(bundle, cameraAt(eye, {0, 0, 0}, 128, 3.0, true), splatSettings());
+    };
+    const Frame near = from(4);
+    for (const double distance : {40.0, 400.0}) {
+        const auto same = compare(from(distance).colour, near.colour);
+        ASSERT_TRUE(same);
+        RecordProperty(fmt::format("from {}", distance),
+                       fmt::format("{:.1f} dB", same->psnrRgb.value_or(99)));
+        EXPECT_GT(same->psnrRgb.value_or(99), 50.0) << distance;
+    }
+}
+
 // What share of the quarters of each view's blocks a picture needs.
 std::vector<double> neededOf(const Bundle& bundle, const Camera& novel) {
     const PageSet set(bundle);
@@ -202,10 +239,11 @@ std::vector<double> neededOf(const Bundle& bundle, const Camera& novel) {
         source.fx = static_cast<float>(r.camera().fx);
         source.fy = static_cast<float>(r.camera().fy);
         source.map = pixelMap(r.camera(), novel);
+        const ShareLength shares(novel, prepared.radius);
         int needed = 0;
         for (const splat::BlockInfo& block : r.blocks) {
             splat::BlockTask task;
-            if (!splat::planBlock(r, block, source, novel, true, task)) continue;
+            if (!splat::planBlock(r, block, source, novel, shares, true, task)) continue;
             splat::forNeeded(
                 task, [&](int u0, int v0, int u1, int v1) { needed += (u1 - u0) * (v1 - v0); });
         }

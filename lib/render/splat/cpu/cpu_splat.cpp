@@ -136,13 +136,14 @@ void CpuSplatRenderer::planFrame(const Camera& camera) {
         }
         sources_.push_back(sourceOf(r, set_.pages()[page], prepared_.pages[page], camera));
     }
+    const ShareLength shares(camera, prepared_.radius);
     std::size_t first = 0;
     for (std::size_t k = 0; k < prepared_.rectangles.size(); ++k) {
         const auto& info = prepared_.rectangles[k];
         parallelFor(0, info.blocks.size(), 512, [&](std::int64_t i) {
             BlockTask& task = tasks_[first + i];
             task.source = static_cast<std::uint32_t>(k);
-            seen_[first + i] = planBlock(info, info.blocks[i], sources_[k], camera,
+            seen_[first + i] = planBlock(info, info.blocks[i], sources_[k], camera, shares,
                                          settings_.splat == SplatRule::data, task);
         });
         first += info.blocks.size();
@@ -168,7 +169,8 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
         static_cast<std::uint64_t>(camera.width) * static_cast<std::uint64_t>(camera.height);
     STX_CHECK(limits_.checkAllocation(pixels, wantNormals_ ? 48 : 20, "the frame"));
     const Stopwatch watch;
-    Picture picture{camera, lightsInWorld(settings_.lighting, camera.worldFromCamera()), {}, {}, 0};
+    Picture picture{
+        camera, lightsInWorld(settings_.lighting, lightPose(camera).worldFromCamera()), {}, {}, 0};
     parallelFor(0, 2, [&](std::int64_t part) {
         if (part == 0) {
             planFrame(camera);

@@ -122,7 +122,7 @@ void GlRenderer::setCamera(const Camera& c) const {
 
 void GlRenderer::setLights(const Camera& camera) const {
     // Positions go through the modelview matrix, whose origin is the centre of the points.
-    const Lighting world = lightsInWorld(settings_.lighting, camera.worldFromCamera());
+    const Lighting world = lightsInWorld(settings_.lighting, lightPose(camera).worldFromCamera());
     const glm::vec4 ambient(world.ambient, 1.0f), black(0, 0, 0, 1);
     glLightModelfv(GL_LIGHT_MODEL_AMBIENT, &ambient.x);
     glColorMaterial(GL_FRONT_AND_BACK, GL_AMBIENT_AND_DIFFUSE);
@@ -152,7 +152,7 @@ void GlRenderer::setLights(const Camera& camera) const {
 /// point gets the colour that all lights together give it, as the other backends give it to each
 /// pixel.
 void GlRenderer::lightPoints(const Camera& camera) {
-    const Lighting world = lightsInWorld(settings_.lighting, camera.worldFromCamera());
+    const Lighting world = lightsInWorld(settings_.lighting, lightPose(camera).worldFromCamera());
     litColours_ = points_.coloursF;
     parallelFor(0, litColours_.size(), 4096, [&](std::size_t i) {
         const glm::vec3 normal = points_.normals[i];

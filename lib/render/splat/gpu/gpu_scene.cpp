@@ -131,6 +131,7 @@ Result<GpuScene> GpuScene::upload(const PageSet& set, const EglContext& context,
         job.progress(i + 1, count, "uploading textures");
     }
     scene.rectangles = std::move(prepared.rectangles);
+    scene.radius = prepared.radius;
     for (const splat::PreparedRectangle& r : scene.rectangles) {
         const PageRectangle& at = *r.rectangle;
         scene.places.push_back(cells[at.page] + glm::ivec3(at.pageX, at.pageY, 0));

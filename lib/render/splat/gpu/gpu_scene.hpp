@@ -26,6 +26,7 @@ struct GpuScene {
     float maxColour = 1.0f;    ///< of linear bundles
     std::vector<splat::PreparedRectangle> rectangles;
     std::vector<glm::ivec3> places;  ///< per rectangle: x, y, layer of its first texel
+    double radius = 0;               ///< as in PreparedPages
     std::int64_t points = 0;
     std::int64_t textureBytes = 0;
 

@@ -45,6 +45,10 @@ class GpuSplatRenderer final : public Renderer {
     Result<void> prepare(Job& job);
     Result<Frame> render(const Camera& camera) override;
     void expect(const Camera& next) override { expected_ = next; }
+    void lightFrom(const std::optional<Camera>& pose) override {
+        Renderer::lightFrom(pose);
+        begun_.reset();  // in another light
+    }
     std::string backend() const override { return "gpu"; }
     std::string device() const override { return context_->device().name; }
     SplatCounts counts();
@@ -112,8 +116,8 @@ Frame GpuSplatRenderer::emptyFrame(const Camera& camera) const {
 
 Result<Begun> GpuSplatRenderer::begin(const Camera& camera, int slot) {
     const auto start = Clock::now();
-    SplatFrame frame =
-        planSplatFrame(resources_->scene, settings_, camera, resources_->pipeline->margin());
+    SplatFrame frame = planSplatFrame(resources_->scene, settings_, camera, lightPose(camera),
+                                      resources_->pipeline->margin());
     STX_CHECK(resources_->pipeline->draw(frame, slot));
     return Begun{camera, slot, millisecondsSince(start)};
 }

@@ -51,8 +51,8 @@ FrameUniforms uniformsOf(const GpuScene& scene, const RenderSettings& settings, 
     return u;
 }
 
-void addLights(const Lighting& settings, const Camera& novel, SplatFrame& frame) {
-    const Lighting lighting = lightsInWorld(settings, novel.worldFromCamera());
+void addLights(const Lighting& settings, const Camera& pose, SplatFrame& frame) {
+    const Lighting lighting = lightsInWorld(settings, pose.worldFromCamera());
     for (const auto& light : lighting.lights)
         frame.lights.push_back(
             {glm::vec4(light.vector, light.kind == Light::Kind::point ? 1.0f : 0.0f),
@@ -75,12 +75,13 @@ struct Planned {
 };
 
 void planBlocks(const splat::PreparedRectangle& info, const splat::RectangleImages& source,
-                const Camera& novel, SplatRule rule, std::vector<Planned>& planned) {
+                const Camera& novel, const ShareLength& shares, SplatRule rule,
+                std::vector<Planned>& planned) {
     planned.assign(info.blocks.size(), {});
     parallelFor(0, planned.size(), 512, [&](std::int64_t i) {
         Planned& p = planned[i];
-        p.seen =
-            splat::planBlock(info, info.blocks[i], source, novel, rule == SplatRule::data, p.task);
+        p.seen = splat::planBlock(info, info.blocks[i], source, novel, shares,
+                                  rule == SplatRule::data, p.task);
         if (p.seen) p.density = density(info, info.blocks[i], p.task, novel);
     });
 }
@@ -112,8 +113,9 @@ TaskEntry taskEntry(const splat::BlockTask& t, glm::ivec2 begin, glm::ivec2 end,
 }  // namespace
 
 SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
-                          const Camera& novel, int margin) {
+                          const Camera& novel, const Camera& lights, int margin) {
     SplatFrame frame;
+    const ShareLength shares(novel, scene.radius);
     frame.uniforms = uniformsOf(scene, settings, novel, margin);
     std::vector<TaskEntry> small, large;
     double crowd = 0;  // weights of the points that may meet in one pixel, all views together
@@ -130,7 +132,7 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
         frame.views.push_back({glm::vec4(m.a0, c.orthographic ? 1.0f : 0.0f), glm::vec4(m.au, c.fx),
                                glm::vec4(m.av, c.fy), glm::vec4(m.b0, 0), glm::vec4(m.bu, 0),
                                glm::vec4(m.bv, 0)});
-        planBlocks(info, source, novel, settings.splat, planned);
+        planBlocks(info, source, novel, shares, settings.splat, planned);
         double densest = 0, heaviest = 0;
         const glm::ivec3 place = scene.places[k];
         for (const Planned& p : planned) {
@@ -159,7 +161,7 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
     const double weight = std::clamp(2147483647.0 / (steps * 4.0 * crowd), 1.0, kLargestWeight);
     frame.uniforms.scales = glm::vec4(std::floor(weight), steps / scene.maxColour, 0, 0);
 
-    addLights(settings.lighting, novel, frame);
+    addLights(settings.lighting, lights, frame);
     return frame;
 }
 

@@ -33,11 +33,6 @@ namespace {
 // Shares are of q, see shareScale().
 
 // Holes that no source looks into (fillUnseen).
-/// Shares are of no distance beyond so many times the scene's radius: from farther away, with a
-/// narrower field of view, they would be more than the scene is deep. Ten models from 60 radii:
-/// 38.3 -> 43.4 dB, alike with 8 and 24. Nearer eyes, which see all of the scene in more than 7.2
-/// degrees, change nothing.
-constexpr double kMostRadii = 16.0;
 /// How far surface is looked for in each direction around a small hole, pixels, and directions that
 /// must meet some, of eight: see enclosed().
 constexpr int kSmallReach = 12;
