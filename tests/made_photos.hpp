@@ -322,8 +322,9 @@ inline Bytes numbers(std::initializer_list<std::pair<std::uint32_t, int>> values
 }
 
 /// HEIC without pixels: picture 1 of 32x24 turned by `quarters` counter-clockwise, depth 2 of
-/// 16x12 with Apple's XMP (3). `targets` of the depth: 1, or 2 as iOS 18 writes them.
-inline Bytes heicBoxes(int quarters = 0, int targets = 1) {
+/// 16x12 with Apple's XMP (3). `targets` of the depth: 1, or 2 as iOS 18 writes them. `colours`:
+/// what is in boxes `colr` of the picture.
+inline Bytes heicBoxes(int quarters = 0, int targets = 1, const std::vector<Bytes>& colours = {}) {
     const auto item = [](std::uint32_t id, std::uint32_t flags, std::string_view type,
                          std::string_view rest = std::string_view("\0", 1)) {
         Bytes content = numbers({{2, 1}, {flags, 3}, {id, 2}, {0, 2}});
@@ -340,22 +341,18 @@ inline Bytes heicBoxes(int quarters = 0, int targets = 1) {
     };
     Bytes kind = numbers({{0, 4}});
     append(kind, std::string_view("urn:mpeg:hevc:2015:auxid:2\0", 27));
+    const auto count = static_cast<std::uint32_t>(colours.size());
+    Bytes all = joined({size(32, 24), size(16, 12), box("auxC", kind),
+                        box("irot", numbers({{static_cast<std::uint32_t>(quarters), 1}}))});
+    Bytes ofColour = numbers({{1, 2}, {2 + count, 1}, {1, 1}, {4, 1}});
+    for (std::uint32_t i = 0; i < count; ++i) {
+        all = joined({all, box("colr", colours[i])});
+        appendBig(ofColour, 5 + i, 1);
+    }
     const Bytes properties = box(
-        "iprp",
-        joined({box("ipco",
-                    joined({size(32, 24), size(16, 12), box("auxC", kind),
-                            box("irot", numbers({{static_cast<std::uint32_t>(quarters), 1}}))})),
-                box("ipma", numbers({{0, 4},
-                                     {2, 4},
-                                     {1, 2},
-                                     {2, 1},
-                                     {1, 1},
-                                     {4, 1},
-                                     {2, 2},
-                                     {3, 1},
-                                     {2, 1},
-                                     {3, 1},
-                                     {4, 1}}))}));
+        "iprp", joined({box("ipco", all),
+                        box("ipma", joined({numbers({{0, 4}, {2, 4}}), ofColour,
+                                            numbers({{2, 2}, {3, 1}, {2, 1}, {3, 1}, {4, 1}})}))}));
     Bytes depthOf = numbers({{2, 2}, {static_cast<std::uint32_t>(targets), 2}, {1, 2}});
     if (targets > 1) appendBig(depthOf, 4, 2);
     const Bytes references = box("iref", joined({numbers({{0, 4}}), box("auxl", depthOf),

@@ -30,6 +30,8 @@ std::string lower(std::string text) {
 Result<Texture> readPicture(const fs::path& path, Job& job) {
     STX_TRY(const auto bytes, readFile(path, job.limits));
     STX_TRY(auto decoded, decodeImage(bytes, path.string(), job.limits));
+    if (auto* light = std::get_if<std::vector<float>>(&decoded.values); light && decoded.linear)
+        makeFinite(*light, decoded.channelNames, fmt::format("'{}'", path.string()), job);
     if (const std::string note = toRec709(decoded); !note.empty()) job.note(note);
     if (decoded.bits() == 16) job.note("16-bit colour is read as 8 bits");
     const int orientation = readExif(bytes).orientation;

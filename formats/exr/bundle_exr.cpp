@@ -381,12 +381,16 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
         entry.splats = hasVectors(part, "splatU") && hasVectors(part, "splatV");
         entry.metallicRoughness = hasAll(part, kSurface);
         entry.emissive = hasAll(part, kEmissive);
-        if (const auto* points = part.attribute<double>("stx:points");
-            points && *points >= 0 && *points <= 1e15)
-            entry.points = static_cast<std::int64_t>(*points);
         entry.bytes = part.bytes;
-        if (const auto* summary = part.attribute<std::string>("stx:summary"))
-            entry.summary = ViewSummary::from(*summary);
+        if (isTrimmed(part, entry.view.camera)) {
+            header.bounds.reset();
+        } else {
+            if (const auto* points = part.attribute<double>("stx:points");
+                points && *points >= 0 && *points <= 1e15)
+                entry.points = static_cast<std::int64_t>(*points);
+            if (const auto* summary = part.attribute<std::string>("stx:summary"))
+                entry.summary = ViewSummary::from(*summary);
+        }
         header.views.push_back(std::move(entry));
     }
     if (const int at = environmentPartOf(reader); at >= 0) {

@@ -106,7 +106,11 @@ void setExrCamera(ExrPart& part, const Camera& camera, double nearPlane, double 
 /// What the cameras of a file count from, as Bundle::origin, in its first part; 0 is left out.
 void setExrOrigin(ExrPart& first, const glm::dvec3& origin);
 [[nodiscard]] glm::dvec3 exrOrigin(const ExrReader& reader);
-/// Error (invalidInput) when there is none, or it makes no sense. Its images are empty.
+/// Whether another program has cut pixels off a view of ours, or put some around it: then what its
+/// header says of them does not hold. `camera`: as exrCamera() gives it.
+[[nodiscard]] bool isTrimmed(const ExrPart& part, const Camera& camera);
+/// The view of a part's data window. Error (invalidInput) when there is no camera, or it makes no
+/// sense, or is not one of so many pixels. Its images are empty.
 [[nodiscard]] Result<ReferenceView> exrCamera(const ExrPart& part);
 
 }  // namespace stx

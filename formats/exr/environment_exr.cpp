@@ -1,6 +1,7 @@
 #include "formats/exr/environment_exr.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "formats/exr/exr_colour.hpp"
@@ -125,6 +126,27 @@ Result<ExrEnvironmentHeader> environmentHeader(const ExrPart& part) {
     return header;
 }
 
+void makeFinite(std::span<float> values, std::span<const std::string> channels,
+                const std::string& where, Job& job) {
+    std::int64_t infinite = 0, nothing = 0;
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+        const bool alpha = channels[c] == "A";
+        const auto isColour = [&](const char* name) { return channels[c] == name; };
+        if (!alpha && std::ranges::none_of(std::array{"R", "G", "B", "Y"}, isColour)) continue;
+        for (std::size_t i = c; i < values.size(); i += channels.size()) {
+            if (std::isfinite(values[i])) continue;
+            values[i] = !(values[i] > 0) ? 0.0f : alpha ? 1.0f : kLargestHalf;
+            ++(values[i] > 0 ? infinite : nothing);
+        }
+    }
+    if (infinite > 0)
+        job.note(fmt::format("{}: {} values of the environment are infinite: they count as {}",
+                             where, infinite, kLargestHalf));
+    if (nothing > 0)
+        job.note(fmt::format("{}: {} values of the environment are no numbers: they count as 0",
+                             where, nothing));
+}
+
 Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& reader, int index,
                                                                Job& job) {
     const ExrPart& part = reader.parts()[index];
@@ -145,25 +167,15 @@ Result<std::shared_ptr<const Environment>> readEnvironmentPart(const ExrReader& 
         if (rgb) channels.insert(channels.end(), {{"G", at + 1, 4}, {"B", at + 2, 4}});
         if (part.channel("A")) channels.push_back({"A", at + 3, 4});
         STX_CHECK(reader.readPart(index, channels));
-        std::int64_t infinite = 0, nothing = 0;
         for (glm::vec4& p : pixels.pixels()) {
             if (!rgb) p.g = p.b = p.r;
             if (!part.channel("A")) p.a = 1.0f;
-            // Other programs' pictures of light may have holes in it, and suns that overflowed.
-            for (int c = 0; c < 4; ++c) {
-                if (std::isfinite(p[c])) continue;
-                p[c] = !(p[c] > 0) ? 0.0f : c < 3 ? kLargestHalf : 1.0f;
-                ++(p[c] > 0 ? infinite : nothing);
-            }
-            if (rgb && part.rec709FromRgb)
-                p = glm::vec4(glm::mat3(*part.rec709FromRgb) * glm::vec3(p), p.a);
         }
-        if (infinite > 0)
-            job.note(fmt::format("{}: {} values of the environment are infinite: they count as {}",
-                                 reader.where(), infinite, kLargestHalf));
-        if (nothing > 0)
-            job.note(fmt::format("{}: {} values of the environment are no numbers: they count as 0",
-                                 reader.where(), nothing));
+        static const std::vector<std::string> kNames = {"R", "G", "B", "A"};
+        makeFinite({at, pixels.count() * kNames.size()}, kNames, reader.where(), job);
+        if (rgb && part.rec709FromRgb)
+            for (glm::vec4& p : pixels.pixels())
+                p = glm::vec4(glm::mat3(*part.rec709FromRgb) * glm::vec3(p), p.a);
         const auto texture = [&](const Image<glm::vec4>& image) {
             return header.linear ? textureFromPremultiplied(image)
                                  : textureFromPremultiplied8(image);

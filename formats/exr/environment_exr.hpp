@@ -2,6 +2,8 @@
 
 #include <filesystem>
 #include <memory>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "formats/exr/exr_file.hpp"
@@ -43,6 +45,12 @@ struct ExrEnvironmentHeader {
 /// high, taken as latlong. Errors: environmentHeader(), files, memory.
 [[nodiscard]] Result<std::shared_ptr<const Environment>> readEnvironmentPart(
     const ExrReader& reader, int part, Job& job);
+
+/// Other programs' pictures of light may have holes in it, and suns that overflowed: of the
+/// channels R, G, B, Y and A what is infinite becomes 65504 (alpha: 1), what is no number 0. Notes
+/// say how many. `values` are interleaved.
+void makeFinite(std::span<float> values, std::span<const std::string> channels,
+                const std::string& where, Job& job);
 
 /// A file of its own: an OpenEXR file with one part. Errors: environmentPart(), files.
 [[nodiscard]] Result<void> writeEnvironmentExr(const Environment& environment,

@@ -127,6 +127,14 @@ glm::dvec3 exrOrigin(const ExrReader& reader) {
     return origin && std::isfinite(origin->x + origin->y + origin->z) ? *origin : glm::dvec3(0.0);
 }
 
+bool isTrimmed(const ExrPart& part, const Camera& camera) {
+    if (part.originX != 0 || part.originY != 0) return true;
+    constexpr double kRounding = 1e-9;
+    const auto* stored = part.attribute<glm::dvec2>("stx:fieldOfView");
+    return stored &&
+           glm::distance(*stored, camera.fieldOfView()) > kRounding * glm::length(*stored);
+}
+
 Result<ReferenceView> exrCamera(const ExrPart& part) {
     ReferenceView view;
     view.name = part.name;
@@ -170,11 +178,18 @@ Result<ReferenceView> exrCamera(const ExrPart& part) {
         if (!value) return missing(name);
         *to = *value;
     }
+    c.cx -= part.originX;
+    c.cy -= part.originY;
     const auto* orthographic = part.attribute<std::int64_t>("stx:orthographic");
     const auto* bits = part.attribute<std::int64_t>("stx:depthBits");
     if (!orthographic) return missing("stx:orthographic");
     if (!bits) return missing("stx:depthBits");
     c.orthographic = *orthographic != 0;
+    if (part.width == part.displayWidth && part.height == part.displayHeight && isTrimmed(part, c))
+        return fail(ErrorCode::invalidInput,
+                    "part '{}': its camera is not one of {}x{} pixels, for stx:fieldOfView is "
+                    "another; a program has resized the picture and left the camera as it was",
+                    part.name, c.width, c.height);
     view.depthBits = static_cast<int>(*bits);
     if (const auto* noDepth = part.attribute<std::string>("stx:noDepth")) {
         const auto named = noDepthNamed(*noDepth);

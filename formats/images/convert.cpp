@@ -11,7 +11,7 @@ namespace stx {
 
 namespace {
 
-/// Index of the channel with that name, in the main layer if there are several; -1 = none.
+/// Index of the channel with that name; -1 = none.
 int channelNamed(const DecodedImage& image, std::string_view name) {
     for (int i = 0; i < image.channels; ++i) {
         if (image.channelNames[i] == name) return i;
@@ -23,11 +23,13 @@ struct ColourChannels {
     int r = 0, g = 0, b = 0, a = -1;  ///< indices; a = -1: there is no alpha
 };
 
-/// Where an image's colour stands: by name, else by position.
+/// Where an image's colour stands: R G B or Y by name, else by position.
 ColourChannels colourChannels(const DecodedImage& image) {
     int r = channelNamed(image, "R"), g = channelNamed(image, "G"), b = channelNamed(image, "B");
     int a = channelNamed(image, "A");
-    if (r < 0 || g < 0 || b < 0) {
+    if (const int y = channelNamed(image, "Y"); r < 0 && g < 0 && b < 0 && y >= 0) {
+        r = g = b = y;
+    } else if (r < 0 || g < 0 || b < 0) {
         const bool grey = image.channels < 3;
         r = 0;
         g = grey ? 0 : 1;
@@ -130,6 +132,7 @@ Image<glm::u8vec4> rgba8From(const DecodedImage& image, Rgba8Loss* loss) {
                                      to8(cover));
               });
         lost.linear = image.linear;
+        if (!image.linear) lost.bits = 32;
         lost.clipped = clipped;
     }
     if (loss) loss->add(lost);

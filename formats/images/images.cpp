@@ -129,6 +129,13 @@ Result<T> at(std::string_view name, const ImageReader& reader, const Limits& lim
 
 }  // namespace
 
+Result<DecodedImage> decodeDepthImage(ByteSpan bytes, std::string_view name, const Limits& limits) {
+    if (!isExr(bytes)) return decodeImage(bytes, name, limits);
+    STX_TRY(auto image, decodeExr(bytes, name, limits, true));
+    STX_CHECK(at(name, placeInDisplay(image, limits)));
+    return image;
+}
+
 Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Limits& limits) {
     if (bytes.empty())
         return failAt(fmt::format("'{}'", name), ErrorCode::invalidInput,

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -70,6 +71,12 @@ struct DecodedImage {
 /// to call from several threads, none of which waits for another.
 [[nodiscard]] Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name,
                                                const Limits& limits);
+
+/// The same, for its depth: of an OpenEXR file with several parts it is another one.
+[[nodiscard]] Result<DecodedImage> decodeDepthImage(ByteSpan bytes, std::string_view name,
+                                                    const Limits& limits);
+/// Which of the channels of these names is depth: Z before other names; -1: none says so.
+[[nodiscard]] int depthChannelOf(std::span<const std::string> names);
 
 /// Colours of Rec. 709 in the place of those of other primaries (DecodedImage::rec709FromRgb), for
 /// a picture that has R, G and B; others stay. Gives a note of that; empty: nothing was to be done.

@@ -16,30 +16,18 @@
 namespace stx::imagesets {
 namespace {
 
-Result<DecodedImage> decode(const PictureSource& source, ByteSpan bytes, Job& job) {
+Result<DecodedImage> decode(const PictureSource& source, ByteSpan bytes, Job& job,
+                            decltype(decodeImage)* decoder = decodeImage) {
     noteMorePictures(bytes, source.name, job);
-    auto image = decodeImage(bytes, source.name, job.limits);
+    auto image = decoder(bytes, source.name, job.limits);
     if (image && (image->width < 1 || image->height < 1))
         return failAt(inQuotes(source.name), ErrorCode::invalidInput, "the image has no pixels");
     return image;
 }
 
-/// The image's channel that holds depth: Z before other names, or the only one.
+/// The image's channel that holds depth: by its name, or the only one.
 Result<int> depthChannel(const DecodedImage& image, std::string_view name) {
-    const auto& names = image.channelNames;
-    const auto find = [&](auto matches) {
-        const auto it = std::find_if(names.begin(), names.end(), matches);
-        return it == names.end() ? -1 : static_cast<int>(it - names.begin());
-    };
-    int at = find([](const std::string& n) { return n == "Z"; });
-    // N.Z beside N.X is a coordinate.
-    if (at < 0)
-        at = find([&](const std::string& n) {
-            return n.ends_with(".Z") &&
-                   std::ranges::find(names, n.substr(0, n.size() - 1) + "X") == names.end();
-        });
-    for (const char* other : {"depth", "Depth", "V", "Depth.V"})
-        if (at < 0) at = find([&](const std::string& n) { return n == other; });
+    const int at = depthChannelOf(image.channelNames);
     if (at >= 0) return at;
     if (image.channels <= 2) return 0;
     // Blender and others write a depth three times, as grey.
@@ -183,11 +171,12 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
     STX_TRY(auto image, decode(source, bytes, job));
     out.alpha = image.channelNames.empty() ? image.channels == 2 || image.channels == 4
                                            : channelIn(image, "A") >= 0;
-    if (image.bits() < 32) {
-        if (image.bits() == 16 && deep) {
+    if (!image.linear) {
+        if (image.bits() > 8 && deep) {
             out.texture = linearFromCoded(photos::srgbFloatFrom(image, bytes, colours));
         } else {
-            if (image.bits() == 16) noteRounding(16, "; stx convert -o NAME.exr keeps it", job);
+            if (image.bits() > 8)
+                noteRounding(image.bits(), "; stx convert -o NAME.exr keeps it", job);
             out.texture = photos::srgb8From(image, bytes, colours);
         }
         if (!colours.empty()) job.note(colours);
@@ -228,7 +217,7 @@ Result<StoredDepth> readDepth(const PictureSource& source, Job& job) {
         return out;
     }
     STX_TRY(const auto bytes, readFile(source.path, job.limits));
-    STX_TRY(const auto image, decode(source, bytes, job));
+    STX_TRY(const auto image, decode(source, bytes, job, decodeDepthImage));
     STX_TRY(const int channel, depthChannel(image, source.name));
     out.values = Image<float>(image.width, image.height);
     std::visit(

@@ -144,13 +144,7 @@ FileColours coloursOfPng(ByteSpan file) {
             return {{},
                     "its cICP says that its colours are of narrow range or not RGB, which is not "
                     "converted: they are taken for sRGB of full range"};
-        const auto points = pointsOf(primaries);
-        const auto curve = curveOf(transfer);
-        if (points && curve) return madeOf(*points, *curve);
-        return {{},
-                fmt::format("its colours are coded by the primaries {} and the transfer function "
-                            "{} of ITU-T H.273, which are not converted: they are taken for sRGB",
-                            primaries, transfer)};
+        return coloursOfCodes(primaries, transfer);
     }
     if (!iccp.empty()) {
         // A name, a zero, and the compression, which is 0.
@@ -202,6 +196,20 @@ Bytes profileOfTiff(ByteSpan file) {
 
 }  // namespace
 
+FileColours coloursOfCodes(unsigned primaries, unsigned transfer) {
+    const auto points = pointsOf(primaries);
+    const auto curve = curveOf(transfer);
+    if (points && curve) return madeOf(*points, *curve);
+    return {{},
+            fmt::format("its colours are coded by the primaries {} and the transfer function {} of "
+                        "ITU-T H.273, which are not converted: they are taken for sRGB",
+                        primaries, transfer)};
+}
+
+std::string madeSrgb(Rgba8Image& picture, const FileColours& colours) {
+    return colours.note.empty() ? toSrgb(picture, colours.profile) : colours.note;
+}
+
 FileColours coloursOf(ByteSpan file) {
     if (isJpeg(file)) return {readJpegSegments(file).profile, {}};
     if (beginsWith(file, "\x89PNG\r\n\x1a\n"sv)) return coloursOfPng(file);
@@ -210,13 +218,12 @@ FileColours coloursOf(ByteSpan file) {
 }
 
 void fileToSrgb(Rgba8Image& picture, ByteSpan file, std::string& note) {
-    const FileColours colours = coloursOf(file);
-    note = colours.note.empty() ? toSrgb(picture, colours.profile) : colours.note;
+    note = madeSrgb(picture, coloursOf(file));
 }
 
 RgbaFloatImage srgbFloatFrom(const DecodedImage& image, ByteSpan file, std::string& note) {
     RgbaFloatImage out = rgbaFloatFrom(image);
-    if (image.bits() > 16) return out;
+    if (image.linear) return out;
     const FileColours colours = coloursOf(file);
     note = colours.note.empty() ? toSrgb(out, colours.profile) : colours.note;
     return out;
@@ -228,8 +235,8 @@ Rgba8Image srgb8From(const DecodedImage& image, ByteSpan file, std::string& note
         fileToSrgb(out, file, note);
         return out;
     }
-    if (image.bits() == 32 || coloursOf(file).profile.empty()) {
-        if (image.bits() == 16) note = coloursOf(file).note;
+    if (image.linear || coloursOf(file).profile.empty()) {
+        if (!image.linear) note = coloursOf(file).note;
         return rgba8From(image, loss);
     }
     if (loss) loss->add({.bits = image.bits()});

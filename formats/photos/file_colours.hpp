@@ -16,11 +16,16 @@ struct FileColours {
     std::string note;  ///< of what it says and nobody here converts
 };
 [[nodiscard]] FileColours coloursOf(ByteSpan file);
+/// The same of codes of ITU-T H.273 (tables 2 and 3), as PNG's cICP and HEIF's nclx have them.
+[[nodiscard]] FileColours coloursOfCodes(unsigned primaries, unsigned transfer);
 
+/// Makes sRGB of a picture by what its file says; gives the note of fileToSrgb().
+[[nodiscard]] std::string madeSrgb(Rgba8Image& picture, const FileColours& colours);
 /// Makes sRGB of a decoded picture by what its file says. `note` is what was done, or not; empty
 /// where the colours are sRGB already.
 void fileToSrgb(Rgba8Image& picture, ByteSpan file, std::string& note);
-/// rgba8From() as sRGB; 16 bits are rounded behind the conversion. Floats stay as they are.
+/// rgba8From() as sRGB; more than 8 bits are rounded behind the conversion. Linear
+/// light stays as it is.
 [[nodiscard]] Rgba8Image srgb8From(const DecodedImage& image, ByteSpan file, std::string& note,
                                    Rgba8Loss* loss = nullptr);
 /// The picture of a file as viewers show it: 8-bit sRGB, turned as its EXIF says. `name` is for
@@ -28,7 +33,7 @@ void fileToSrgb(Rgba8Image& picture, ByteSpan file, std::string& note);
 [[nodiscard]] Result<Rgba8Image> decodeAsShown(ByteSpan file, std::string_view name,
                                                const Limits& limits, std::string& note,
                                                Rgba8Loss* loss = nullptr);
-/// rgbaFloatFrom() as coded sRGB of 0 to 1. Floats stay as they are.
+/// rgbaFloatFrom() as coded sRGB of 0 to 1. Linear light stays as it is.
 [[nodiscard]] RgbaFloatImage srgbFloatFrom(const DecodedImage& image, ByteSpan file,
                                            std::string& note);
 

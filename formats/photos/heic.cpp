@@ -164,6 +164,24 @@ void noteAuxiliary(const std::string& kind, Photo& photo) {
         photo.others.emplace_back("a gain map");
 }
 
+/// What an item says of its colours: an ICC profile, wherever that is among its boxes, or else
+/// codes of H.273 (ISO/IEC 14496-12, 12.1.5).
+FileColours coloursOfItem(const HeifBoxes& boxes, const HeifBoxes::Item& item) {
+    FileColours out;
+    for (const std::size_t index : item.properties) {
+        const ByteSpan body = boxes.properties[index].content;
+        if (boxes.properties[index].type != "colr") continue;
+        if (beginsWith(body, "prof") || beginsWith(body, "rICC")) {
+            const ByteSpan profile = body.subspan(4);
+            return {{profile.begin(), profile.end()}, {}};
+        }
+        if (beginsWith(body, "nclx") && body.size() >= 8)
+            out = coloursOfCodes(static_cast<unsigned>(bigEndian(body, 4, 2)),
+                                 static_cast<unsigned>(bigEndian(body, 6, 2)));
+    }
+    return out;
+}
+
 }  // namespace
 
 bool isHeif(ByteSpan head) {
@@ -186,11 +204,7 @@ Result<void> readHeic(Photo& photo, const Limits& limits) {
     const auto copy = std::make_shared<const Bytes>(withoutAuxiliaries(file, boxes));
     photo.colour = {PhotoImage::Coding::heif, *copy,         copy, boxes.primary,
                     turn.upright.x,           turn.upright.y};
-    if (const auto* colr = boxes.property(primary, "colr");
-        colr && (beginsWith(colr->content, "prof") || beginsWith(colr->content, "rICC"))) {
-        const ByteSpan profile = colr->content.subspan(4);
-        photo.profile.assign(profile.begin(), profile.end());
-    }
+    photo.colours = coloursOfItem(boxes, primary);
     if (const auto* exif = descriptionOf(boxes, boxes.primary, "Exif")) {
         const Bytes bytes = HeifBoxes::bytesOf(*exif, kMostMetadata);
         // Four bytes count up to the TIFF. Its orientation repeats irot.

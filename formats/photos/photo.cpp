@@ -6,8 +6,6 @@
 #include "formats/images/exif.hpp"
 #include "formats/images/images.hpp"
 #include "formats/images/reader.hpp"
-#include "formats/photos/colour_profile.hpp"
-#include "formats/photos/file_colours.hpp"
 #include "formats/photos/heif_decode.hpp"
 #include "formats/photos/numbers.hpp"
 #include "formats/photos/readers.hpp"
@@ -295,7 +293,7 @@ Result<Rgba8Image> decodeColour(const Photo& photo, std::string& profileNote, Jo
         fileToSrgb(picture, from.bytes, profileNote);
         return turnedUpright(std::move(picture), photo.orientation);
     }
-    profileNote = toSrgb(picture, photo.profile);
+    profileNote = madeSrgb(picture, photo.colours);
     return turnedUpright(std::move(picture), photo.orientation);
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/files/files.hpp"
+#include "formats/photos/file_colours.hpp"
 #include "lib/base/image.hpp"
 #include "lib/geometry/camera.hpp"
 #include "lib/model/texture.hpp"
@@ -80,8 +81,8 @@ struct Photo {
     std::string accuracy = "unknown";  ///< "absolute", "relative", "unscaled", "unknown"
     /// Of a matrix that the file tells, of the upright picture.
     std::optional<PhotoIntrinsics> intrinsics;
-    double focal35 = 0;  ///< EXIF: mm, of a 36x24 mm camera with the same diagonal; 0 = none
-    Bytes profile;       ///< ICC, of HEIF's colours; a JPEG's is in its own bytes
+    double focal35 = 0;   ///< EXIF: mm, of a 36x24 mm camera with the same diagonal; 0 = none
+    FileColours colours;  ///< of HEIF's picture; other files have theirs in their own bytes
     std::vector<std::string> mattes;  ///< "portraiteffectsmatte" …
     std::vector<std::string> others;  ///< what else is in it: "a gain map" …
 

@@ -12,8 +12,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kPictureEndings[] = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp",
-                                                ".bmp", ".exr", ".ppm",  ".pgm", ".tga"};
+/// Also those that are not read here, so that they are not left out without a word.
+constexpr std::string_view kPictureEndings[] = {
+    ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp", ".exr",  ".ppm",  ".pgm",
+    ".tga", ".hdr", ".jp2",  ".gif", ".psd",  ".dds",  ".sgi", ".heic", ".heif", ".avif"};
 
 bool isDigit(char c) {
     return c >= '0' && c <= '9';

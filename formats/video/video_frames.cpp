@@ -152,11 +152,14 @@ class SteadyFrames final : public VideoFrames {
     SteadyFrames(std::unique_ptr<VideoFrames> frames, bool strict, Job& job)
         : frames_(std::move(frames)), strict_(strict), job_(job) {}
     ~SteadyFrames() override {
-        if (damaged_.empty()) return;
-        job_.note(fmt::format(
-            "{} of {} cannot be used, and the frame before stands for each; stx "
-            "background --strict stops there; the first: {}",
-            damaged_.size(), counted(count(), "frame"), damaged_.begin()->second.text()));
+        const auto wanted = [](const auto& entry) { return entry.second.wanted; };
+        const auto first = std::ranges::find_if(damaged_, wanted);
+        if (first == damaged_.end()) return;
+        job_.note(
+            fmt::format("{} of {} cannot be used, and the frame before stands for each; stx "
+                        "background --strict stops there; the first: {}",
+                        std::ranges::count_if(damaged_, wanted), counted(count(), "frame"),
+                        first->second.error.text()));
     }
     SteadyFrames(const SteadyFrames&) = delete;
     SteadyFrames& operator=(const SteadyFrames&) = delete;
@@ -164,16 +167,10 @@ class SteadyFrames final : public VideoFrames {
     [[nodiscard]] glm::ivec2 size() const override { return frames_->size(); }
     [[nodiscard]] int count() const override { return frames_->count(); }
     [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
-        auto picture = frames_->frame(k);
-        if (!picture && !strict_ && isDamage(picture.error())) {
-            {
-                const std::lock_guard lock(mutex_);
-                damaged_.emplace(k, picture.error());
-            }
-            for (int other = k - 1; !picture && other >= 0; --other) tryInstead(other, picture);
-            for (int other = k + 1; !picture && other < count(); ++other)
-                tryInstead(other, picture);
-        }
+        auto picture = frames_->frame(knownFor(k));
+        if (!picture && !strict_ && isDamage(picture.error()))
+            if (const int other = findFor(k, picture.error()); other != k)
+                picture = frames_->frame(other);
         if (!picture) return picture;
         const auto found = (*picture)->size(), wanted = size();
         if (found != wanted)
@@ -184,20 +181,68 @@ class SteadyFrames final : public VideoFrames {
                 found.x, found.y, place(0), wanted.x, wanted.y);
         return picture;
     }
+    [[nodiscard]] int shownFor(int k) const override {
+        const std::lock_guard lock(mutex_);
+        const auto known = damaged_.find(k);
+        return known == damaged_.end() ? k : known->second.shown;
+    }
     [[nodiscard]] std::string name(int k) const override { return frames_->name(k); }
     [[nodiscard]] std::string place(int k) const override { return frames_->place(k); }
     [[nodiscard]] std::string description() const override { return frames_->description(); }
 
   private:
-    void tryInstead(int k, Result<std::shared_ptr<const Rgba8Image>>& picture) {
-        if (auto other = frames_->frame(k)) picture = std::move(other);
+    struct Damage {
+        Error error;
+        int shown;            ///< the frame that stands for it; itself where none can
+        bool wanted = false;  ///< and not only found on the way to another
+    };
+
+    /// shownFor() a frame that is being read.
+    int knownFor(int k) {
+        const std::lock_guard lock(mutex_);
+        const auto known = damaged_.find(k);
+        if (known == damaged_.end()) return k;
+        known->second.wanted = true;
+        return known->second.shown;
+    }
+
+    /// What stands for a frame that is damaged: the nearest one before it that is not, or else the
+    /// first one after. Remembers it for all that it passes, so that each is read once.
+    int findFor(int k, const Error& error) {
+        const std::lock_guard lock(mutex_);
+        if (const auto known = damaged_.find(k); known != damaged_.end()) {
+            known->second.wanted = true;
+            return known->second.shown;
+        }
+        std::map<int, Damage> passed;
+        passed.emplace(k, Damage{error, k});
+        int shown = k;
+        const auto tryFrame = [&](int other) {
+            const auto picture = frames_->frame(other);
+            if (picture)
+                shown = other;
+            else if (isDamage(picture.error()))
+                passed.emplace(other, Damage{picture.error(), k});
+        };
+        for (int other = k - 1; shown == k && other >= 0; --other) {
+            const auto known = damaged_.find(other);
+            if (known == damaged_.end())
+                tryFrame(other);
+            else
+                shown = known->second.shown;
+        }
+        for (int other = k + 1; shown == k && other < count(); ++other) tryFrame(other);
+        for (auto& [at, damage] : passed) damage.shown = shown == k ? at : shown;
+        damaged_.merge(passed);
+        damaged_.at(k).wanted = true;
+        return shown;
     }
 
     std::unique_ptr<VideoFrames> frames_;
     bool strict_;
     Job& job_;
-    std::mutex mutex_;
-    std::map<int, Error> damaged_;
+    mutable std::mutex mutex_;
+    std::map<int, Damage> damaged_;
 };
 
 Result<std::unique_ptr<VideoFrames>> openFilm(const fs::path& input, bool strict, Job& job) {

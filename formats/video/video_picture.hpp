@@ -19,7 +19,7 @@ class VideoPicture {
     void turn(video::Turn how) { turn_ = how; }
     [[nodiscard]] int width() const { return turn_.sideways() ? header_.height : header_.width; }
     [[nodiscard]] int height() const { return turn_.sideways() ? header_.width : header_.height; }
-    /// Of a sample of luma: 8 to 16.
+    /// Of a sample of the video, at least 8 and at most 16: more than 8 are rounded by colour().
     [[nodiscard]] int bits() const { return header_.bits; }
     /// Luma is there as it was coded; else the picture has colours only.
     [[nodiscard]] bool hasLuma() const { return header_.rgba == 0; }

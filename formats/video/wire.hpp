@@ -15,7 +15,9 @@ using decoders::Unpacker;
 /// without gaps, or 8-bit RGBA.
 struct PictureHeader {
     std::int32_t width = 0, height = 0;
-    std::int32_t bits = 8;  ///< of a sample; above 8 in two bytes, little-endian
+    /// Of a sample; above 8 in two bytes, little-endian. Of RGBA: those that the video has, 8
+    /// to 16.
+    std::int32_t bits = 8;
     std::int32_t chromaShiftX = 0, chromaShiftY = 0;
     std::uint8_t chroma = 0, chromaLeft = 0;
     YuvMatrix matrix = YuvMatrix::bt709;  ///< by which it is decoded

@@ -34,6 +34,7 @@ class CheckedFrames final : public StillFrames {
                         picture->width(), picture->height(), size().x, size().y);
         return picture;
     }
+    [[nodiscard]] int shownFor(int k) const override { return frames_.shownFor(k); }
 
   private:
     StillFrames& frames_;

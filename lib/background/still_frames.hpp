@@ -25,7 +25,15 @@ class StillFrames {
     /// Frame `k`, from 0, with straight alpha. Any frame, as often as wanted, from several threads
     /// at a time. Errors are those of reading it, and (invalidInput) another size.
     [[nodiscard]] virtual Result<std::shared_ptr<const Rgba8Image>> frame(int k) = 0;
+    /// The frame whose picture frame(k) gave: another one where `k` is damaged.
+    [[nodiscard]] virtual int shownFor(int k) const { return k; }
 };
+
+/// Whether frame which[i] counts: it is not the picture of which[i - 1] once more, because it is
+/// damaged. Both have been read.
+[[nodiscard]] bool isSound(const StillFrames& frames, std::span<const int> which, std::size_t i);
+/// How many do.
+[[nodiscard]] int soundFrames(const StillFrames& frames, std::span<const int> which);
 
 /// The same frames; those that are read first are kept, as many as fit into `bytes`. What passes
 /// over all frames several times reads the kept ones once.
@@ -36,6 +44,7 @@ class KeptFrames : public StillFrames {
     [[nodiscard]] glm::ivec2 size() const override { return frames_->size(); }
     [[nodiscard]] int count() const override { return frames_->count(); }
     [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override;
+    [[nodiscard]] int shownFor(int k) const override { return frames_->shownFor(k); }
 
   private:
     StillFrames* frames_;

@@ -8,7 +8,7 @@ namespace stx {
 
 /// What a pixel of `select` and `median` may take while it is worked on, beside the frames: most of
 /// it are the counts of 3 x 256 values.
-inline constexpr std::uint64_t kSelectBytesPerPixel = 1700;
+inline constexpr std::uint64_t kSelectBytesPerPixel = 1710;
 /// The same of `n2pg`, with the frame that is being taken in.
 inline constexpr std::uint64_t kN2pgBytesPerPixel = 24;
 

@@ -109,7 +109,7 @@ class N2pgModel {
     }
 
     void write(int frames, StillBackground& to) const {
-        const int most = std::min(frames - 1, 255);
+        const int most = std::clamp(frames - 1, 1, 255);
         forRows([&](int y, Row&) {
             for (int x = 0; x < width_; ++x) {
                 glm::u8vec4 colour(0, 0, 0, 255);
@@ -265,7 +265,7 @@ Result<StillBackground> n2pgBackground(StillFrames& frames, std::span<const int>
                         which[i]);
         if (i == 0)
             model.begin(*frame);
-        else
+        else if (isSound(frames, which, i))
             model.update(*frame);
         job.progress(static_cast<std::int64_t>(i) + 1, static_cast<std::int64_t>(which.size()),
                      "looking at frames");
@@ -273,7 +273,7 @@ Result<StillBackground> n2pgBackground(StillFrames& frames, std::span<const int>
     StillBackground out;
     out.colour = Rgba8Image(size.x, size.y);
     out.confidence = Image<std::uint8_t>(size.x, size.y);
-    out.framesUsed = static_cast<int>(which.size());
+    out.framesUsed = soundFrames(frames, which);
     model.write(out.framesUsed, out);
     return out;
 }

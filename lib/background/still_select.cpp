@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <limits>
+#include <optional>
 
 #include "lib/background/still_methods.hpp"
 #include "lib/background/still_motion.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/model/same_pictures.hpp"
 
 namespace stx {
 namespace {
@@ -50,14 +52,15 @@ struct ValueCounts {
         return n;
     }
 };
-static_assert(sizeof(ValueCounts) + kFramesAtOnce * 10 <= kSelectBytesPerPixel);
-
 /// A frame's part of a band of rows.
 struct BandFrame {
     std::vector<glm::u8vec4> colour;
     LumaRows luma;
     std::vector<std::uint32_t> motion;
+    bool sound = true;
 };
+// With the frame before those.
+static_assert(sizeof(ValueCounts) + (kFramesAtOnce + 1) * 10 <= kSelectBytesPerPixel);
 
 /// Makes the background of a band of rows.
 class BandSelector {
@@ -69,11 +72,23 @@ class BandSelector {
           settings_(settings),
           job_(job),
           window_(frames.size().x, frames.size().y, settings.windowDivisor,
-                  settings.drift ? MotionScore::gradient : MotionScore::luma) {}
+                  settings.drift ? MotionScore::gradient : MotionScore::luma),
+          hashes_(which.size()) {}
+
+    /// Looks for what the motion of the first frame is measured by. Before the first find().
+    [[nodiscard]] Result<void> begin() {
+        STX_TRY(const auto first, frames_.frame(which_[0]));
+        for (second_ = 1; second_ + 1 < which_.size(); ++second_) {
+            STX_CHECK(job_.checkCancelled());
+            STX_TRY(const auto other, frames_.frame(which_[second_]));
+            if (!(*other == *first)) break;
+        }
+        return {};
+    }
 
     /// Of a band of rows, the largest motion that a frame may have to be kept.
     [[nodiscard]] Result<void> find(int first, int rows) {
-        begin(first, rows);
+        beginBand(first, rows);
         return findQuietest();
     }
 
@@ -93,7 +108,7 @@ class BandSelector {
 
     /// The background of a band of rows.
     [[nodiscard]] Result<void> make(int first, int rows, StillBackground& to) {
-        begin(first, rows);
+        beginBand(first, rows);
         values_.assign(pixels_, ValueCounts{});
         STX_CHECK(forBlocks([&](std::size_t n) { count(n); }));
         write(to);
@@ -105,42 +120,74 @@ class BandSelector {
   private:
     /// Calls body(n) with the next n frames of the band in block_, in their order.
     Result<void> forBlocks(const std::function<void(std::size_t)>& body) {
-        const bool moving = settings_.method == StillMethod::select;
-        const int width = frames_.size().x;
         block_.resize(std::min(kFramesAtOnce, which_.size()));
-        LumaRows before;
+        BandFrame before;
         for (std::size_t from = 0; from < which_.size(); from += block_.size()) {
             STX_CHECK(job_.checkCancelled());
             const std::size_t n = std::min(block_.size(), which_.size() - from);
-            STX_CHECK(takeFrames(frames_, which_.subspan(from, n), job_.limits.maxMemoryBytes / 4,
-                                 [&](std::size_t i, const Rgba8Image& picture) {
-                                     BandFrame& f = block_[i];
-                                     const auto* at =
-                                         picture.data() + static_cast<std::size_t>(first_) * width;
-                                     f.colour.assign(at, at + pixels_);
-                                     if (moving)
-                                         f.luma.take(picture, window_.firstNeeded(first_),
-                                                     window_.rowsNeeded(first_, rows_));
-                                 }));
-            if (moving) {
-                parallelFor(0, n, [&](std::size_t i) {
-                    block_[i].motion.resize(pixels_);
-                    // Before the first frame there is none: it moves as the second does.
-                    if (from + i == 0) return;
-                    window_.quantities(i == 0 ? before : block_[i - 1].luma, block_[i].luma, first_,
-                                       rows_, block_[i].motion);
-                });
-                if (from == 0) block_[0].motion = block_[1].motion;
-            }
+            STX_CHECK(take(from, n));
+            if (moving()) STX_CHECK(measure(from, n, before));
             body(n);
-            std::swap(before, block_[n - 1].luma);
+            std::swap(before, block_[n - 1]);
             steps += static_cast<std::int64_t>(n);
             job_.progress(steps, allSteps, "looking at frames");
         }
         return {};
     }
 
-    void begin(int first, int rows) {
+    [[nodiscard]] bool moving() const { return settings_.method == StillMethod::select; }
+
+    /// The n frames of the band from which_[from] on.
+    Result<void> take(std::size_t from, std::size_t n) {
+        STX_CHECK(takeFrames(frames_, which_.subspan(from, n), job_.limits.maxMemoryBytes / 4,
+                             [&](std::size_t i, const Rgba8Image& picture) {
+                                 BandFrame& f = block_[i];
+                                 const auto* at = picture.data() + offset_;
+                                 f.colour.assign(at, at + pixels_);
+                                 if (!moving()) return;
+                                 takeLuma(picture, f.luma);
+                                 auto& hash = hashes_[from + i];
+                                 if (!hash) hash = hashOf(std::as_bytes(picture.pixels()));
+                             }));
+        for (std::size_t i = 0; i < n; ++i) block_[i].sound = isSound(frames_, which_, from + i);
+        return {};
+    }
+
+    void takeLuma(const Rgba8Image& picture, LumaRows& to) const {
+        to.take(picture, window_.firstNeeded(first_), window_.rowsNeeded(first_, rows_));
+    }
+
+    /// Whether a frame shows what the one before does: a film that stood still, or was made for
+    /// more frames in a second.
+    [[nodiscard]] bool isRepeated(std::size_t k) const {
+        return k > 0 && hashes_[k] == hashes_[k - 1];
+    }
+
+    /// What moves in the block's frames.
+    Result<void> measure(std::size_t from, std::size_t n, const BandFrame& before) {
+        const auto previous = [&](std::size_t i) -> const BandFrame& {
+            return i == 0 ? before : block_[i - 1];
+        };
+        parallelFor(0, n, [&](std::size_t i) {
+            BandFrame& f = block_[i];
+            f.motion.resize(pixels_);
+            if (from + i > 0 && !isRepeated(from + i))
+                window_.quantities(previous(i).luma, f.luma, first_, rows_, f.motion);
+        });
+        // Before the first frame there is none.
+        if (from == 0) {
+            LumaRows second;
+            STX_TRY(const auto picture, frames_.frame(which_[second_]));
+            takeLuma(*picture, second);
+            window_.quantities(block_[0].luma, second, first_, rows_, block_[0].motion);
+        }
+        // Nothing moves in a repeated frame, which yet does not show that what is there stays.
+        for (std::size_t i = 0; i < n; ++i)
+            if (isRepeated(from + i)) block_[i].motion = previous(i).motion;
+        return {};
+    }
+
+    void beginBand(int first, int rows) {
         first_ = first;
         rows_ = rows;
         pixels_ = static_cast<std::size_t>(rows) * frames_.size().x;
@@ -159,7 +206,7 @@ class BandSelector {
                 for (std::size_t i = 0; i < n; ++i) {
                     const std::uint32_t motion = block_[i].motion[p];
                     std::uint32_t* at = first + kept - 1;
-                    if (motion >= *at || !isSeen(block_[i].colour[p])) continue;
+                    if (motion >= *at || !block_[i].sound || !isSeen(block_[i].colour[p])) continue;
                     for (; at > first && at[-1] > motion; --at) *at = at[-1];
                     *at = motion;
                 }
@@ -188,7 +235,8 @@ class BandSelector {
     void count(std::size_t n) {
         forPixels([&](std::size_t p) {
             for (std::size_t i = 0; i < n; ++i)
-                if (largest_.empty() || block_[i].motion[p] <= largest_[offset_ + p])
+                if (block_[i].sound &&
+                    (largest_.empty() || block_[i].motion[p] <= largest_[offset_ + p]))
                     values_[p].add(block_[i].colour[p]);
         });
     }
@@ -219,6 +267,8 @@ class BandSelector {
     const StillSettings& settings_;
     Job& job_;
     MotionWindow window_;
+    std::vector<std::optional<std::size_t>> hashes_;  ///< of the pictures, once they were read
+    std::size_t second_ = 1;  ///< the first frame that shows something else than the first one
     int first_ = 0, rows_ = 0;
     std::size_t pixels_ = 0, offset_ = 0;  ///< of the band; of its first in the picture
     std::vector<BandFrame> block_;
@@ -258,7 +308,6 @@ Result<StillBackground> selectBackground(StillFrames& frames, std::span<const in
     StillBackground out;
     out.colour = Rgba8Image(size.x, size.y);
     out.confidence = Image<std::uint8_t>(size.x, size.y);
-    out.framesUsed = static_cast<int>(which.size());
     BandSelector selector(kept, which, settings, job);
     selector.allSteps = static_cast<std::int64_t>(which.size()) * passes;
     const auto forBands = [&](const auto& body) -> Result<void> {
@@ -271,10 +320,12 @@ Result<StillBackground> selectBackground(StillFrames& frames, std::span<const in
         return {};
     };
     if (settings.method == StillMethod::select) {
+        STX_CHECK(selector.begin());
         STX_CHECK(forBands([&](int first, int count) { return selector.find(first, count); }));
         selector.keepNoise();
     }
     STX_CHECK(forBands([&](int first, int count) { return selector.make(first, count, out); }));
+    out.framesUsed = soundFrames(kept, which);
     return out;
 }
 

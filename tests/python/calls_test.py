@@ -141,6 +141,29 @@ class Calls(Case):
                 np.testing.assert_allclose(frame.views[0].camera.position + frame.origin,
                                            bundle.views[0].camera.position + bundle.origin, atol=1e-4)
 
+    def test_bundles_of_views_have_their_origin(self):
+        bundles = []
+        for x in (500000, 500010):
+            with open("far.obj", "w") as file:
+                for a, b, c in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)):
+                    file.write(f"v {x + a} {b} {c}\n")
+                file.write("f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+            bundles.append(stx.convert("far.obj", views="ring:2", size=(16, 16), job=stx.Job()))
+        a, b = bundles
+        self.assertNotEqual(tuple(a.origin), tuple(b.origin))
+        self.assertEqual(tuple(stx.Bundle(a.views).origin), tuple(a.origin))
+        fresh = stx.View(a.views[1].colour, a.views[1].depth, a.views[1].camera, name="fresh")
+        both = stx.Bundle([fresh, a.views[0], b.views[1]])
+        self.assertEqual(tuple(both.origin), tuple(a.origin))
+        for view, (model, k) in zip(both.views, ((a, 1), (a, 0), (b, 1))):
+            np.testing.assert_allclose(view.camera.position + both.origin, model.views[k].camera.position + model.origin, atol=1e-9)
+        given = stx.Bundle([fresh, b.views[0]], origin=(499000, 0, 0))
+        self.assertEqual(tuple(given.origin), (499000, 0, 0))
+        np.testing.assert_array_equal(given.views[0].camera.position, fresh.camera.position)
+        np.testing.assert_allclose(given.views[1].camera.position + given.origin, b.views[0].camera.position + b.origin, atol=1e-9)
+        self.assertEqual(tuple(stx.Bundle([fresh]).origin), (0, 0, 0))
+        self.fails("usage", "origin", stx.Bundle, [fresh], origin=3)
+
     def test_a_film_is_not_replaced_while_it_is_open(self):
         bundle = stx.Bundle([plate(stx.Camera((16, 12), 20))])
         stx.Film([bundle] * 3).save("q_%d.exr")

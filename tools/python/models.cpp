@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <optional>
 #include <set>
 
 #include <pybind11/stl.h>
@@ -12,7 +13,12 @@
 namespace stx::python {
 namespace {
 
-using ViewPointer = std::shared_ptr<ReferenceView>;
+/// A view, and what the camera counts from, where that is known: of one that was taken from a
+/// model.
+struct HeldView {
+    std::shared_ptr<const ReferenceView> view;
+    std::optional<glm::dvec3> origin;
+};
 
 /// A part of a model that keeps the model. pybind11 knows no const; nothing here changes it.
 template <class T>
@@ -24,6 +30,15 @@ std::shared_ptr<T> partOf(const AnyModel& whole, const T& part) {
 template <class T, class I>
 auto member(I T::*image) {
     return [image](const std::shared_ptr<T>& t) { return arrayOf((*t).*image, t); };
+}
+template <class I>
+auto ofView(I ReferenceView::*image) {
+    return [image](const HeldView& v) { return arrayOf((*v.view).*image, v.view); };
+}
+/// A property that is the value of a member.
+template <class T>
+auto valueOfView(T ReferenceView::*value) {
+    return [value](const HeldView& v) { return (*v.view).*value; };
 }
 
 /// Pixels of a picture without alpha are background where there is no depth.
@@ -50,9 +65,9 @@ void checkNormals(const ReferenceView& view) {
     }
 }
 
-ViewPointer makeView(const py::object& colour, const py::object& depth, const Camera& camera,
-                     std::string name, int depthBits, const std::string& noDepth,
-                     const py::object& normals) {
+HeldView makeView(const py::object& colour, const py::object& depth, const Camera& camera,
+                  std::string name, int depthBits, const std::string& noDepth,
+                  const py::object& normals) {
     Bundle one;
     ReferenceView& view = one.views.emplace_back();
     bool hasAlpha = false;
@@ -79,14 +94,23 @@ ViewPointer makeView(const py::object& colour, const py::object& depth, const Ca
     if (made->hasNormals()) checkNormals(*made);
     if (!hasAlpha && made->noDepth == NoDepth::empty) clearBackground(*made);
     bleedColour(made->texture);
-    return made;
+    return {std::move(made), {}};
 }
 
-py::object makeBundle(const std::vector<ViewPointer>& views, std::string title) {
+py::object makeBundle(const std::vector<HeldView>& views, std::string title,
+                      const py::object& origin) {
     Bundle bundle;
+    if (!origin.is_none()) {
+        bundle.origin = vectorFrom(origin, "origin");
+    } else if (const auto placed = std::ranges::find_if(
+                   views, [](const HeldView& held) { return held.origin.has_value(); });
+               placed != views.end()) {
+        bundle.origin = *placed->origin;
+    }
     std::set<std::string> names;
-    for (const ViewPointer& view : views) {
-        bundle.views.push_back(*view);
+    for (const HeldView& held : views) {
+        bundle.views.push_back(*held.view);
+        bundle.views.back().camera.position += held.origin.value_or(bundle.origin) - bundle.origin;
         std::string& name = bundle.views.back().name;
         if (name.empty()) name = fmt::format("view{:03}", bundle.views.size() - 1);
         if (!names.insert(name).second)
@@ -100,7 +124,8 @@ py::object makeBundle(const std::vector<ViewPointer>& views, std::string title) 
 template <class M>
 py::list viewsOf(const M& model) {
     py::list views;
-    for (const ReferenceView& view : model.get().views) views.append(partOf(model, view));
+    for (const ReferenceView& view : model.get().views)
+        views.append(HeldView{{model.model, &view}, originOf(*model.model)});
     return views;
 }
 
@@ -127,8 +152,8 @@ py::object boundsArray(const Bounds& bounds) {
 
 void bindView(py::module_& module) {
     using V = ReferenceView;
-    py::class_<V, ViewPointer>(module, "View",
-                               R"(A reference view: colour, depth and the camera that saw them.
+    py::class_<HeldView>(module, "View",
+                         R"(A reference view: colour, depth and the camera that saw them.
 
 colour: (height, width, 3 or 4), uint8 (sRGB) or float32 (linear light), straight alpha. depth:
 (height, width) floats, scene units to the plane through the viewpoint (not along the ray), infinite
@@ -140,32 +165,36 @@ measured). normals: (height, width, 3), unit (within 0.05), world axes; 0 where 
              py::kw_only(), py::arg("name") = "", py::arg("depth_bits") = 16,
              py::arg("no_depth") = "empty", py::arg("normals") = py::none())
         .def_property_readonly(
-            "colour", [](const ViewPointer& v) { return arrayOf(v->texture, v); },
+            "colour", ofView(&V::texture),
             "(height, width, 4), straight alpha: uint8 (sRGB) or float32 (linear light); of an "
             "atlas None.")
-        .def_property_readonly("depth", member(&V::depth),
+        .def_property_readonly("depth", ofView(&V::depth),
                                "(height, width) float32, scene units, planar; inf: none.")
         .def_property_readonly(
-            "normals", member(&V::normal),
+            "normals", ofView(&V::normal),
             "(height, width, 3) float32, unit, world axes; 0 where there is none; or None.")
-        .def_property_readonly("splat_u", member(&V::splatU),
+        .def_property_readonly("splat_u", ofView(&V::splatU),
                                "(height, width, 3) float32: half axis of the splat, or None.")
-        .def_property_readonly("splat_v", member(&V::splatV), "The other half axis, or None.")
-        .def_property_readonly("metallic_roughness", member(&V::metallicRoughness),
+        .def_property_readonly("splat_v", ofView(&V::splatV), "The other half axis, or None.")
+        .def_property_readonly("metallic_roughness", ofView(&V::metallicRoughness),
                                "(height, width, 2) float32, 0..1, or None.")
-        .def_property_readonly("emissive", member(&V::emissive),
+        .def_property_readonly("emissive", ofView(&V::emissive),
                                "(height, width, 3) float32, linear light, or None.")
-        .def_readonly("name", &V::name, "Unique in its bundle.")
+        .def_property_readonly("name", valueOfView(&V::name), "Unique in its bundle.")
+        .def_property_readonly("camera", valueOfView(&V::camera), "The camera that saw it.")
+        .def_property_readonly("near_plane", valueOfView(&V::nearPlane),
+                               "Least distance of its depth, scene units.")
+        .def_property_readonly("far_plane", valueOfView(&V::farPlane),
+                               "Greatest distance of its depth, scene units.")
+        .def_property_readonly("depth_bits", valueOfView(&V::depthBits), "8, 16 or 32, of files.")
+        .def_property_readonly("background", valueOfView(&V::background),
+                               "What is behind all that moves.")
         .def_property_readonly(
-            "camera", [](const V& v) { return v.camera; }, "The camera that saw it.")
-        .def_readonly("near_plane", &V::nearPlane, "Least distance of its depth, scene units.")
-        .def_readonly("far_plane", &V::farPlane, "Greatest distance of its depth, scene units.")
-        .def_readonly("depth_bits", &V::depthBits, "8, 16 or 32, of files.")
-        .def_readonly("background", &V::background, "What is behind all that moves.")
-        .def_property_readonly(
-            "no_depth", [](const V& v) { return nameOf(v.noDepth); }, "'empty' or 'unknown'.")
-        .def("__repr__", [](const V& v) {
-            return fmt::format("<stx.View '{}' {}x{}>", v.name, v.camera.width, v.camera.height);
+            "no_depth", [](const HeldView& v) { return nameOf(v.view->noDepth); },
+            "'empty' or 'unknown'.")
+        .def("__repr__", [](const HeldView& v) {
+            const Camera& camera = v.view->camera;
+            return fmt::format("<stx.View '{}' {}x{}>", v.view->name, camera.width, camera.height);
         });
 }
 
@@ -195,7 +224,9 @@ void bindBundle(py::module_& module) {
         module, "Bundle",
         R"(An object as reference views: what a SimpleTexture file holds.
 
-views: at least one stx.View, all of one kind of colour. title: of the file. The arrays of its views are
+views: at least one stx.View, all of one kind of colour. title: of the file. origin: (3,), what cameras
+and positions count from; None: what those of the first view that was taken from a model count from, else 0.
+Views that were taken from models of other origins are moved to it. The arrays of its views are
 read-only and show its memory; they keep it alive.)");
     bindSave<BundleModel>(
         type,
@@ -204,10 +235,11 @@ which OpenEXR's premultiplied pixels do not hold), .mp4, .xmt or .bt.
 
 jpeg_quality: of colours in .mp4, .xmt and .bt, 1..100; 0: PNG, exact. no_clobber: a target that exists
 is an error. Raises stx.Error (usage, invalidInput, io).)");
-    type.def(py::init([](const std::vector<ViewPointer>& views, std::string title) {
-                 return makeBundle(views, std::move(title)).cast<BundleModel>();
+    type.def(py::init([](const std::vector<HeldView>& views, std::string title,
+                         const py::object& origin) {
+                 return makeBundle(views, std::move(title), origin).cast<BundleModel>();
              }),
-             py::arg("views"), py::kw_only(), py::arg("title") = "")
+             py::arg("views"), py::kw_only(), py::arg("title") = "", py::arg("origin") = py::none())
         .def_property_readonly("views", &viewsOf<BundleModel>, "A list of stx.View.")
         .def_property_readonly(
             "time", [](const BundleModel& b) { return b.get().time; },

@@ -170,7 +170,7 @@ decoders::PictureFacts factsOf(const OIIO::ImageSpec& spec, const std::string& f
     facts.originY = spec.y - spec.full_y;
     facts.displayWidth = spec.full_width;
     facts.displayHeight = spec.full_height;
-    facts.linear = bits == 32;
+    facts.linear = spec.format.is_floating_point();
     facts.premultiplied = isPremultiplied(spec, format);
     facts.storedLargest = storedLargestOf(spec, format);
     return facts;

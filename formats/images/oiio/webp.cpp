@@ -34,17 +34,31 @@ bool decodeWebp(std::span<const std::byte> file, PictureAnswer& answer) {
 }
 
 void encodeWebp(const EncodeRequest& request) {
-    std::uint8_t* bytes = nullptr;
-    const int stride = request.width * request.channels;
-    const std::size_t size =
-        request.channels == 4
-            ? WebPEncodeLosslessRGBA(request.values, request.width, request.height, stride, &bytes)
-            : WebPEncodeLosslessRGB(request.values, request.width, request.height, stride, &bytes);
-    const std::unique_ptr<std::uint8_t, void (*)(void*)> owner(bytes, &WebPFree);
-    if (size == 0) throw Failed{ErrorCode::failed, "the picture cannot be coded as WebP"};
+    // What WebPEncodeLosslessRGBA() does, which invents colours under alpha 0.
+    constexpr float kEffort = 70;
+    WebPConfig config;
+    WebPPicture picture;
+    if (!WebPConfigPreset(&config, WEBP_PRESET_DEFAULT, kEffort) || !WebPPictureInit(&picture))
+        throw Failed{ErrorCode::failed, "libwebp is not the one that this was built for"};
+    WebPMemoryWriter coded;
+    WebPMemoryWriterInit(&coded);
+    const std::unique_ptr<WebPPicture, void (*)(WebPPicture*)> freePicture(&picture,
+                                                                           &WebPPictureFree);
+    const std::unique_ptr<WebPMemoryWriter, void (*)(WebPMemoryWriter*)> freeCoded(
+        &coded, &WebPMemoryWriterClear);
+    config.lossless = config.exact = 1;
+    picture.use_argb = 1;
+    picture.width = request.width;
+    picture.height = request.height;
+    picture.writer = WebPMemoryWrite;
+    picture.custom_ptr = &coded;
+    const auto take = request.channels == 4 ? WebPPictureImportRGBA : WebPPictureImportRGB;
+    if (!take(&picture, request.values, request.width * request.channels) ||
+        !WebPEncode(&config, &picture))
+        throw Failed{ErrorCode::failed, "the picture cannot be coded as WebP"};
     std::FILE* file = std::fopen(request.path, "wb");
     if (!file) cannotWrite("the file cannot be opened");
-    const bool written = std::fwrite(bytes, 1, size, file) == size;
+    const bool written = std::fwrite(coded.mem, 1, coded.size, file) == coded.size;
     if (std::fclose(file) != 0 || !written) cannotWrite("the file cannot be written");
 }
 

@@ -137,6 +137,7 @@ std::vector<std::byte> packed(const AVFrame& frame, const AVCodecContext& codec)
     Packer out;
     if (!isPlanes(*format)) {
         header.rgba = 1;
+        header.bits = std::clamp(format->comp[0].depth, 8, 16);
         const auto rgba = rgbaOf(frame, header.matrix, header.fullRange != 0);
         out.put(header);
         out.add(rgba.data(), rgba.size());

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdlib>
 #include <functional>
+#include <map>
 #include <vector>
 
 #include "lib/background/still.hpp"
@@ -23,11 +24,16 @@ class DrawnFrames : public StillFrames {
         ++reads;
         if (std::find(broken.begin(), broken.end(), k) != broken.end())
             return fail(ErrorCode::invalidInput, "frame {} is broken", k);
-        return std::make_shared<const Rgba8Image>(draw_(k));
+        return std::make_shared<const Rgba8Image>(draw_(shownFor(k)));
+    }
+    [[nodiscard]] int shownFor(int k) const override {
+        const auto other = shown.find(k);
+        return other == shown.end() ? k : other->second;
     }
 
     std::atomic<int> reads = 0;
     std::vector<int> broken;
+    std::map<int, int> shown;  ///< of damaged frames: which stands for each
 
   private:
     glm::ivec2 size_;

@@ -89,6 +89,43 @@ TEST(StillBackground, SelectSeesBehindWhatCoversAPlaceMostOfTheTime) {
     EXPECT_LT(errors(StillMethod::select).peps, 0.002);
 }
 
+/// Nothing moves in a frame that shows once more what the one before does.
+TEST(StillBackground, FramesThatAreShownAgainDoNotTellWhatStandsStill) {
+    constexpr int kFrames = 100;
+    const auto passing = [](int k) {
+        return wallWithBox(kStillSize, k, {k * 5 % 120 - 12, 24, 12, 16});
+    };
+    Job job;
+    for (const auto method : {StillMethod::select, StillMethod::median, StillMethod::n2pg}) {
+        SCOPED_TRACE(static_cast<int>(method));
+        DrawnFrames damaged(kStillSize, kFrames, passing);
+        for (int k = 30; k < 40; ++k) damaged.shown[k] = 29;
+        damaged.shown[0] = damaged.shown[1] = damaged.shown[2] = 3;
+        const auto made = mustMakeStill(stillBackground(damaged, methodOf(method), job));
+        EXPECT_EQ(made.framesUsed, kFrames - 13);
+        EXPECT_EQ(backgroundErrors(made.colour, wall(kStillSize)).peps, 0);
+    }
+    // Films that stood still for a while: in the middle, at the beginning for longer than frames
+    // are looked at together, and at the end.
+    for (const glm::ivec2 still : {glm::ivec2(29, 39), glm::ivec2(0, 24), glm::ivec2(80, 99)}) {
+        SCOPED_TRACE(still.x);
+        DrawnFrames frozen(kStillSize, kFrames, [&](int k) {
+            return passing(k < still.x || k > still.y ? k : still.y);
+        });
+        const auto made = mustMakeStill(stillBackground(frozen, {}, job));
+        EXPECT_EQ(made.framesUsed, kFrames);
+        EXPECT_EQ(backgroundErrors(made.colour, wall(kStillSize)).peps, 0);
+    }
+    // Each frame is there twice, as in a film that was made for more frames in a second.
+    DrawnFrames twice(kStillSize, kFrames, [&](int k) { return passing(k / 2); });
+    EXPECT_EQ(
+        backgroundErrors(mustMakeStill(stillBackground(twice, {}, job)).colour, wall(kStillSize))
+            .peps,
+        0);
+    DrawnFrames same(kStillSize, 5, [&](int) { return passing(4); });
+    EXPECT_EQ(mustMakeStill(stillBackground(same, {}, job)).colour, passing(4));
+}
+
 /// An even box that is too bright for the camera, and so without the noise of the wall, walks
 /// through the picture: any pixel shows it in a sixth of the frames.
 TEST(StillBackground, SelectDoesNotTakeWhatHasLessNoiseForWhatStandsStill) {

@@ -1,6 +1,7 @@
 // Environments in files of every kind, and against OpenEXR's own exrenvmap.
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <tuple>
 
 #include <gtest/gtest.h>
@@ -188,6 +189,32 @@ TEST(EnvironmentFiles, SayWhatIsWrong) {
     ASSERT_TRUE(saveEnvironment(paintedCube(16), folder / "a.exr", {}, job));
     std::filesystem::resize_file(folder / "a.exr", 700);
     EXPECT_NE(errorOf("a.exr"), "");
+}
+
+TEST(EnvironmentFiles, WhatIsNotFiniteCountsAsTheLargestHalfOrNothing) {
+    const TemporaryFolder folder("environment");
+    std::vector<float> values(4 * 2 * 3, 0.5f);
+    values[0] = std::numeric_limits<float>::infinity();
+    values[4] = std::numeric_limits<float>::quiet_NaN();
+    values[5] = -std::numeric_limits<float>::infinity();
+    std::ofstream file(folder / "sun.pfm", std::ios::binary);
+    file << "PF\n4 2\n-1.0\n";
+    file.write(reinterpret_cast<const char*>(values.data()),
+               static_cast<std::streamsize>(values.size() * sizeof(float)));
+    file.close();
+    Job job;
+    const auto opened = openEnvironment(folder / "sun.pfm", job);
+    ASSERT_TRUE(opened) << opened.error().text();
+    // Its rows begin at the bottom.
+    const auto* light = (*opened)->pictures.at(0).rgbaFloat();
+    ASSERT_TRUE(light);
+    EXPECT_EQ(light->at(0, 1), glm::vec4(65504.0f, 0.5f, 0.5f, 1));
+    EXPECT_EQ(light->at(1, 1), glm::vec4(0.5f, 0, 0, 1));
+    const std::string where = fmt::format("'{}'", (folder / "sun.pfm").string());
+    EXPECT_EQ(job.takeNotes(),
+              (std::vector<std::string>{
+                  where + ": 1 values of the environment are infinite: they count as 65504",
+                  where + ": 2 values of the environment are no numbers: they count as 0"}));
 }
 
 /// OpenEXR's own converter; its samples are on the very edges of faces and pictures.

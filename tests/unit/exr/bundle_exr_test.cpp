@@ -217,6 +217,35 @@ TEST(BundleExr, CamerasOfOtherProgramsAreRead) {
     }
 }
 
+TEST(BundleExr, CamerasFollowADataWindowThatWasTrimmed) {
+    const Bundle bundle = smallBundle(1, 16, false, false);
+    const Bytes bytes = bytesOf(bundle);
+    const auto reader = ExrReader::open(bytes, "a.exr", Limits());
+    ASSERT_TRUE(reader);
+    const Camera& whole = bundle.views[0].camera;
+    EXPECT_FALSE(isTrimmed(reader->parts()[0], whole));
+    for (const glm::ivec2 at : {glm::ivec2(3, -2), glm::ivec2(0, 0)}) {
+        ExrPart part = reader->parts()[0];
+        part.originX = at.x;
+        part.originY = at.y;
+        part.width -= 5;
+        const auto trimmed = exrCamera(part);
+        ASSERT_TRUE(trimmed) << trimmed.error().text();
+        EXPECT_EQ(trimmed->camera.cx, whole.cx - at.x);
+        EXPECT_EQ(trimmed->camera.cy, whole.cy - at.y);
+        EXPECT_EQ(trimmed->camera.width, whole.width - 5);
+        EXPECT_TRUE(isTrimmed(part, trimmed->camera));
+    }
+    ExrPart part = reader->parts()[0];
+    part.width = part.displayWidth = 9;
+    const auto resized = exrCamera(part);
+    ASSERT_FALSE(resized);
+    EXPECT_EQ(
+        resized.error().message,
+        "part 'view 0': its camera is not one of 9x23 pixels, for stx:fieldOfView is another; "
+        "a program has resized the picture and left the camera as it was");
+}
+
 TEST(BundleExr, HostileFilesEndInErrors) {
     REQUIRE_SHARED(folder, "data/malformed/images");
     int files = 0;

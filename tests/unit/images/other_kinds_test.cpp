@@ -364,9 +364,33 @@ TEST(Webp, IsTurnedAsItsExifSays) {
     }
 }
 
-/// Colours under thin alpha come back as they are.
+/// Whatever their number of bits, integers code sRGB.
+TEST(Tiff, IntegersOf32BitsAreNoLinearLight) {
+    Bytes strip;
+    for (std::uint32_t i = 0; i < kWidth * kHeight; ++i) append(strip, 0x80808080, 4);
+    const auto image = decodeImage(tiffOf(strip, {{256, kWidth},
+                                                  {257, kHeight},
+                                                  {258, 32},
+                                                  {259, 1},
+                                                  {262, 1},
+                                                  {273, 8, 4},
+                                                  {277, 1},
+                                                  {278, kHeight},
+                                                  {279, kWidth * kHeight * 4, 4}}),
+                                   "a.tif", Limits());
+    ASSERT_TRUE(image) << image.error().text();
+    EXPECT_EQ(image->bits(), 32);
+    EXPECT_FALSE(image->linear);
+    Rgba8Loss loss;
+    EXPECT_EQ(rgba8From(*image, &loss).at(3, 3), glm::u8vec4(128, 128, 128, 255));
+    EXPECT_EQ(loss.bits, 32);
+    EXPECT_FALSE(loss.linear);
+}
+
+/// Colours under thin alpha, and under none, come back as they are.
 TEST(Webp, AlphaCostsNoColour) {
-    const Bytes pixels = noise(std::size_t{kWidth} * kHeight * 4);
+    Bytes pixels = noise(std::size_t{kWidth} * kHeight * 4);
+    for (std::size_t i = 3; i < pixels.size(); i += 12) pixels[i] = std::byte{0};
     const TemporaryFolder folder;
     const auto path = (folder / "a.webp").string();
     const auto table = loadCodecs();
@@ -387,12 +411,9 @@ TEST(Webp, AlphaCostsNoColour) {
     ASSERT_EQ(image->channels, 4);
     EXPECT_FALSE(image->premultiplied);
     const auto& values = std::get<0>(image->values);
-    // Colours of pixels of no alpha are not kept by the coder.
-    for (std::size_t i = 0; i < values.size(); i += 4) {
-        if (values[i + 3] == 0) continue;
-        for (std::size_t c = 0; c < 4; ++c)
-            ASSERT_EQ(values[i + c], std::to_integer<std::uint8_t>(pixels[i + c])) << i;
-    }
+    ASSERT_EQ(values.size(), pixels.size());
+    for (std::size_t i = 0; i < values.size(); ++i)
+        ASSERT_EQ(values[i], std::to_integer<std::uint8_t>(pixels[i])) << i;
     EXPECT_FALSE(decodeImage(ByteSpan(*bytes).first(bytes->size() / 2), "a.webp", Limits()));
 }
 

@@ -229,6 +229,38 @@ TEST(MadePhotos, HeicBoxesTellSizesTurnAndDepth) {
     EXPECT_DOUBLE_EQ(turned->intrinsics->cy, 17);
 }
 
+TEST(MadePhotos, HeicColoursAreThoseOfTheProfileOrElseOfTheCodes) {
+    const auto colr = [](std::string_view kind, const Bytes& rest) {
+        Bytes out;
+        made::append(out, kind);
+        out.insert(out.end(), rest.begin(), rest.end());
+        return out;
+    };
+    const Bytes profile(5, std::byte{7});
+    const Bytes icc = colr("prof", profile);
+    const auto codes = [&](std::uint32_t primaries, std::uint32_t transfer) {
+        return colr("nclx", made::numbers({{primaries, 2}, {transfer, 2}, {6, 2}, {0x80, 1}}));
+    };
+    const auto coloursOf = [](const std::vector<Bytes>& colours) {
+        const auto photo = open(made::heicBoxes(0, 1, colours));
+        EXPECT_TRUE(photo) << photo.error().text();
+        return photo ? photo->colours : photos::FileColours();
+    };
+    EXPECT_TRUE(coloursOf({}).profile.empty());
+    EXPECT_EQ(coloursOf({icc}).profile, profile);
+    EXPECT_EQ(coloursOf({icc, codes(1, 13)}).profile, profile);
+    EXPECT_EQ(coloursOf({codes(1, 13), icc}).profile, profile);
+    Rgba8Image picture(1, 1, {120, 90, 60, 255});
+    EXPECT_EQ(madeSrgb(picture, coloursOf({codes(1, 13)})), "");
+    EXPECT_EQ(picture.at(0, 0), glm::u8vec4(120, 90, 60, 255));
+    EXPECT_NE(madeSrgb(picture, coloursOf({codes(12, 13)})), "");
+    EXPECT_EQ(picture.at(0, 0), glm::u8vec4(126, 88, 55, 255));
+    EXPECT_EQ(coloursOf({codes(9, 16)}).note,
+              "its colours are coded by the primaries 9 and the transfer function 16 of ITU-T "
+              "H.273, which are not converted: they are taken for sRGB");
+    EXPECT_TRUE(coloursOf({colr("nclx", {})}).profile.empty());
+}
+
 TEST(MadePhotos, CutAnywhereTheyAreAnErrorOrAPhoto) {
     for (const Bytes& whole : {made::applePhoto(), made::gdepthPhoto(), made::dynamicPhoto(),
                                made::samsungPhoto(), made::huaweiPhoto(), made::heicBoxes(1, 2)})

@@ -45,7 +45,7 @@ Rgba8Image coloursOf(const photos::Photo& photo) {
     Job job;
     std::string note;
     photos::Photo plain = photo;
-    plain.profile.clear();
+    plain.colours = {};
     if (plain.colour.coding == photos::PhotoImage::Coding::heif)
         return photos::decodeColour(plain, note, job).value();
     return turnedUpright(decodeRgba8(plain.colour.bytes, "photo", job.limits).value(),

@@ -317,6 +317,24 @@ TEST(Films, WithoutAlphaHaveNone) {
     }
 }
 
+TEST(Films, TellHowManyBitsTheirColoursHave) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    films::writePictures(folder.path(), 1, kWide, kHigh);
+    for (const auto& [pixels, bits] : {std::pair{"bgr0", 8},
+                                       {"gbrp10le", 10},
+                                       {"rgb48le", 16},
+                                       {"yuv420p10le", 10},
+                                       {"yuv420p", 8}}) {
+        films::ffmpeg(folder.path(), fmt::format("-i c%d.png -c:v ffv1 -pix_fmt {} f.mkv", pixels));
+        const auto film = openedFilm(folder / "f.mkv");
+        ASSERT_TRUE(film);
+        const auto decoded = film->picture(0);
+        ASSERT_TRUE(decoded) << decoded.error().text();
+        EXPECT_EQ(decoded->bits(), bits) << pixels;
+    }
+}
+
 // Cut within a group of pictures: an edit list hides those before, which others need.
 TEST(Films, HiddenPicturesAreDecodedAndNotShown) {
     REQUIRE_VIDEO();

@@ -89,6 +89,11 @@ TEST(VideoFrames, SeveralSequencesInAFolderAreAQuestion) {
     const auto text = errorOf({folder.path()}, ErrorCode::invalidInput);
     EXPECT_TRUE(has(text, "2 sequences: colour_#.png (2 pictures), depth_#.png (1 picture)"))
         << text;
+    // Of a kind that is not read here, too.
+    TemporaryFolder kinds;
+    for (const char* name : {"q0.png", "q1.png", "q2.heic"}) writePng(kinds / name, ramp(4, 4));
+    const auto other = errorOf({kinds.path()}, ErrorCode::invalidInput);
+    EXPECT_TRUE(has(other, "2 sequences: q#.heic (1 picture), q#.png (2 pictures)")) << other;
     TemporaryFolder empty;
     EXPECT_TRUE(has(errorOf({empty.path()}, ErrorCode::invalidInput), "no numbered pictures"));
 }
@@ -115,6 +120,41 @@ TEST(VideoFrames, TheFrameBeforeADamagedOneStandsForIt) {
     EXPECT_TRUE(has(notes[0], "2 of 5 frames cannot be used, and the frame before stands for each"))
         << notes[0];
     EXPECT_FALSE(openVideoFrames({folder.path()}, job, true));
+}
+
+TEST(VideoFrames, DamagedFramesAreReadOnceAndCountedWhereTheyAreAskedFor) {
+    TemporaryFolder folder;
+    constexpr int kCount = 60, kSound = 20;
+    for (int k = 0; k < kCount; ++k) {
+        const auto file = folder / fmt::format("f{:02}.png", k);
+        if (k < kSound)
+            writePng(file, ramp(8, 6, k));
+        else
+            writeText(file, "damaged");
+    }
+    Job job;
+    {
+        const auto frames = openVideoFrames({folder.path()}, job);
+        ASSERT_TRUE(frames) << frames.error().text();
+        VideoFrames& f = **frames;
+        EXPECT_EQ(f.shownFor(40), 40) << "nobody has read it";
+        ASSERT_TRUE(f.frame(40));
+        // What it was found on the way to is known, and the files are not needed any more.
+        for (int k = kSound; k <= 40; ++k) {
+            EXPECT_EQ(f.shownFor(k), kSound - 1);
+            fs::remove(folder / fmt::format("f{:02}.png", k));
+        }
+        for (const int k : {30, 40, 41, 59}) {
+            const auto frame = f.frame(k);
+            ASSERT_TRUE(frame) << frame.error().text();
+            EXPECT_EQ((*frame)->at(0, 0).r, 40 + kSound - 1);
+        }
+        EXPECT_EQ(f.shownFor(3), 3);
+    }
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_TRUE(has(notes[0], "4 of 60 frames cannot be used")) << notes[0];
+    EXPECT_TRUE(has(notes[0], "f30.png")) << notes[0];
 }
 
 TEST(VideoFrames, WhatEightBitsLoseIsNotedOnceWhicheverFrameItIsOf) {
