@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <cstdint>
+#include <functional>
 #include <limits>
 #include <map>
 #include <set>
@@ -125,8 +127,15 @@ Result<std::map<std::string, std::string>> picturesIn(const std::string& folder)
     return found;
 }
 
+/// Pairs by number, each named when its turn comes: as many frames as numbers can count may be
+/// asked for.
+struct Pairs {
+    int count = 0;
+    std::function<Pair(int)> at;
+};
+
 /// The pictures of two folders, which have the same names, whatever their endings.
-Result<std::vector<Pair>> pairsOfFolders(const CompareOptions& o) {
+Result<Pairs> pairsOfFolders(const CompareOptions& o) {
     STX_TRY(const auto first, picturesIn(o.a));
     STX_TRY(const auto second, picturesIn(o.b));
     for (const auto& [these, others, folder] :
@@ -138,15 +147,14 @@ Result<std::vector<Pair>> pairsOfFolders(const CompareOptions& o) {
     for (const auto& [name, file] : first) pairs.push_back({file, second.at(name), -1, name});
     if (pairs.empty())
         return fail(ErrorCode::invalidInput, "the folder '{}' has no picture in it", o.a);
-    return pairs;
+    const int count = static_cast<int>(pairs.size());
+    return Pairs{count, [pairs = std::move(pairs)](int i) { return pairs[i]; }};
 }
 
-/// Numbers of the frames of two sequences: as many as are asked for, else the first and all behind
-/// it that either has.
-std::set<int> framesOf(const CompareOptions& o, Job& job) {
+/// Numbers of the frames of two sequences: the first that is asked for and all behind it that
+/// either has.
+std::vector<int> framesOf(const CompareOptions& o, Job& job) {
     std::set<int> frames = {o.firstFrame};
-    for (int frame = o.firstFrame; frame < o.firstFrame + o.frames; ++frame) frames.insert(frame);
-    if (o.frames > 0) return frames;
     std::vector<NumberedFile> found = {{o.firstFrame, o.a}};
     for (const std::string& pattern : {o.a, o.b}) {
         const auto files = numberedFiles(pattern);
@@ -159,15 +167,25 @@ std::set<int> framesOf(const CompareOptions& o, Job& job) {
     if (const auto missing = firstMissing(found))
         job.note(fmt::format("frame {} is in neither sequence; those that are there are compared",
                              *missing));
-    return frames;
+    return {frames.begin(), frames.end()};
 }
 
-/// The frames of two sequences.
-std::vector<Pair> pairsOfSequences(const CompareOptions& o, Job& job) {
-    std::vector<Pair> pairs;
-    for (const int frame : framesOf(o, job))
-        pairs.push_back({*frameName(o.a, frame), *frameName(o.b, frame), frame, ""});
-    return pairs;
+/// The frames of two sequences: as many as are asked for, else framesOf().
+Result<Pairs> pairsOfSequences(const CompareOptions& o, Job& job) {
+    const auto pairOf = [a = o.a, b = o.b](int frame) {
+        return Pair{*frameName(a, frame), *frameName(b, frame), frame, ""};
+    };
+    if (o.frames == 0) {
+        const auto frames = framesOf(o, job);
+        return Pairs{static_cast<int>(frames.size()), [=](int i) { return pairOf(frames[i]); }};
+    }
+    constexpr std::int64_t kMost = std::numeric_limits<int>::max();
+    const std::int64_t last = std::int64_t{o.firstFrame} + o.frames - 1;
+    if (last > kMost)
+        return fail(ErrorCode::usage,
+                    "--frames {} from frame {} on end at frame {}; frames are numbered up to {}",
+                    o.frames, o.firstFrame, last, kMost);
+    return Pairs{o.frames, [=, first = o.firstFrame](int i) { return pairOf(first + i); }};
 }
 
 std::string decibels(std::optional<double> v) {
@@ -211,13 +229,10 @@ struct ManyScores {
 Result<ManyScores> compareMany(const CompareOptions& o, bool folders,
                                const Image<std::uint8_t>* mask, Program& program) {
     ManyScores many;
-    std::vector<Pair> pairs;
-    if (folders)
-        STX_SET(pairs, pairsOfFolders(o));
-    else
-        pairs = pairsOfSequences(o, program.job);
+    STX_TRY(const Pairs pairs, folders ? pairsOfFolders(o) : pairsOfSequences(o, program.job));
     SequenceComparison sequence;
-    for (const Pair& pair : pairs) {
+    for (int i = 0; i < pairs.count; ++i) {
+        const Pair pair = pairs.at(i);
         STX_CHECK(program.job.checkCancelled());
         CompareOptions one = o;
         one.errorPicture = pair.errorPicture(o.errorPicture);
@@ -237,8 +252,8 @@ Result<ManyScores> compareMany(const CompareOptions& o, bool folders,
             program.print(printable(pair.name) + ": " + scoresOf(c, "") + "\n");
     }
     many.total.plain = sequence.total();
-    many.worst = pairs[sequence.worstFrame()];
-    many.worstStep = pairs[many.steadiness.worstFrame()].frame;
+    many.worst = pairs.at(sequence.worstFrame());
+    many.worstStep = pairs.at(many.steadiness.worstFrame()).frame;
     return many;
 }
 

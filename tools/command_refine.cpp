@@ -164,7 +164,8 @@ void addRefine(CommandLine& line, Program& program) {
         "  stx refine capture.exr -o better.exr\n"
         "  stx refine capture.exr -o better.exr --with poses\n"
         "  stx refine film.mp4 -o better.mp4 --without colours\n\n"
-        "Steps, in this order; * of image sets only, as they are read:\n";
+        "Steps, in this order, but for poses and exposure, which come first where views are there "
+        "already; * of image sets only, as they are read:\n";
     for (const RefineStepInfo& step : refineSteps())
         help += fmt::format("  {:<12}{} {} ({})\n", step.name,
                             step.when == RefineWhen::import ? '*' : ' ', step.sentence, step.usual);

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstddef>
 #include <map>
@@ -19,13 +20,18 @@ namespace {
 
 using Pixels = std::span<std::byte>;
 
-Pixels pixelsOf(Image<float>& depth) {
-    return std::as_writable_bytes(depth.pixels());
-}
-
-Pixels pixelsOf(Texture& texture) {
-    if (Rgba8Image* bytes = texture.rgba8()) return std::as_writable_bytes(bytes->pixels());
-    return std::as_writable_bytes(texture.rgbaFloat()->pixels());
+/// All images of a view, in the order of PicturesKey::hashes; those that it lacks are empty.
+constexpr std::size_t kImages = std::tuple_size_v<decltype(PicturesKey::hashes)>;
+std::array<Pixels, kImages> imagesOf(ReferenceView& view) {
+    const auto bytes = [](auto& image) { return std::as_writable_bytes(image.pixels()); };
+    Rgba8Image* colour = view.texture.rgba8();
+    return {colour ? bytes(*colour) : bytes(*view.texture.rgbaFloat()),
+            bytes(view.depth),
+            bytes(view.normal),
+            bytes(view.splatU),
+            bytes(view.splatV),
+            bytes(view.metallicRoughness),
+            bytes(view.emissive)};
 }
 
 /// Pixels one after another in a file without readers but this process.
@@ -95,10 +101,8 @@ class ChangedOnce : public Sequence {
             for (const std::string& note : kept->second.notes) job.note(note);
             return bundle;
         }
-        std::vector<std::size_t> before;
-        for (ReferenceView& view : bundle.views)
-            before.insert(before.end(),
-                          {hashOf(pixelsOf(view.depth)), hashOf(pixelsOf(view.texture))});
+        std::vector<PicturesKey> before;
+        for (const ReferenceView& view : bundle.views) before.push_back(PicturesKey::of(view));
         Job own;
         own.workFor(job);
         STX_CHECK(change_(bundle, own));
@@ -112,7 +116,7 @@ class ChangedOnce : public Sequence {
   private:
     struct KeptView {
         ViewHeader header;
-        std::optional<std::uint64_t> depth, texture;  ///< where; nothing: as they were
+        std::array<std::optional<std::uint64_t>, kImages> at;  ///< where; nothing: as they were
     };
     struct Kept {
         std::vector<KeptView> views;
@@ -120,16 +124,16 @@ class ChangedOnce : public Sequence {
         std::vector<std::string> notes;
     };
 
-    Result<Kept> keep(Bundle& bundle, const std::vector<std::size_t>& before) {
+    Result<Kept> keep(Bundle& bundle, const std::vector<PicturesKey>& before) {
         Kept kept;
         kept.bounds = bundle.bounds;
         for (std::size_t k = 0; k < bundle.views.size(); ++k) {
             ReferenceView& view = bundle.views[k];
-            KeptView v{view, {}, {}};
-            if (const Pixels depth = pixelsOf(view.depth); hashOf(depth) != before[2 * k])
-                STX_SET(v.depth, file_.add(depth));
-            if (const Pixels colour = pixelsOf(view.texture); hashOf(colour) != before[2 * k + 1])
-                STX_SET(v.texture, file_.add(colour));
+            KeptView v{view, {}};
+            const auto images = imagesOf(view);
+            for (std::size_t i = 0; i < kImages; ++i)
+                if (hashOf(images[i]) != before[k].hashes[i])
+                    STX_SET(v.at[i], file_.add(images[i]));
             kept.views.push_back(std::move(v));
         }
         return kept;
@@ -140,10 +144,9 @@ class ChangedOnce : public Sequence {
         for (std::size_t k = 0; k < kept.views.size(); ++k) {
             ReferenceView& view = bundle.views[k];
             static_cast<ViewHeader&>(view) = kept.views[k].header;
-            if (const auto at = kept.views[k].depth)
-                STX_CHECK(file_.read(*at, pixelsOf(view.depth)));
-            if (const auto at = kept.views[k].texture)
-                STX_CHECK(file_.read(*at, pixelsOf(view.texture)));
+            const auto images = imagesOf(view);
+            for (std::size_t i = 0; i < kImages; ++i)
+                if (const auto at = kept.views[k].at[i]) STX_CHECK(file_.read(*at, images[i]));
         }
         return {};
     }

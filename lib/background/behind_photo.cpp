@@ -45,13 +45,14 @@ double farthestFrom(double median, const Image<float>& depth, double scale, glm:
 /// Border that comes into the frame when the eye moves by the largest shift, a share of the median
 /// distance, and looks at what is in the middle of the frame at that distance: what parallax moves
 /// relatively to that, and what turning the camera adds towards the edges. With t the tangent from
-/// the axis to the edge, an edge that is turned away by the shift s has (t + s) / (1 - t s).
+/// the axis to an edge, the farther one, that has (t + s) / (1 - t s) when it is turned away by the
+/// shift s.
 glm::ivec2 borderOf(const ReferenceView& view, double scale, double median, double shift,
                     int step) {
     const int w = view.depth.width(), h = view.depth.height();
     const Camera& camera = view.camera;
-    const auto side = [&](double off, int size, double f) {
-        const double t = 0.5 * size / f;
+    const auto side = [&](double off, int size, double f, double c) {
+        const double t = std::max(c, size - c) / f;
         const double turned =
             t * shift < 1 ? (1 + t * t) / (1 - t * shift) - 1 : kMostBorder * size;
         const double wanted = off + median * turned + kBorderMargin;
@@ -62,7 +63,7 @@ glm::ivec2 borderOf(const ReferenceView& view, double scale, double median, doub
                                    farthestFrom(median, view.depth, scale, {w - 1, 0}, {0, 1}, h));
     const double down = std::max(farthestFrom(median, view.depth, scale, {0, 0}, {1, 0}, w),
                                  farthestFrom(median, view.depth, scale, {0, h - 1}, {1, 0}, w));
-    return {side(across, w, camera.fx), side(down, h, camera.fy)};
+    return {side(across, w, camera.fx, camera.cx), side(down, h, camera.fy, camera.cy)};
 }
 
 /// The larger picture: pixels at the left and above, and its size. The principal point comes into

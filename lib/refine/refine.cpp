@@ -1,6 +1,7 @@
 #include "lib/refine/refine.hpp"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -10,6 +11,7 @@
 #include "lib/refine/exposure.hpp"
 #include "lib/refine/poses.hpp"
 #include "lib/refine/refine_depth.hpp"
+#include "lib/surface/normals.hpp"
 
 namespace stx {
 namespace {
@@ -254,7 +256,10 @@ Result<RefineReport> refineIn(const RefineRoom& room, Bundle& bundle,
         for (std::size_t i = 0; i < part.size(); ++i) {
             ofPart.record(refined[i].refined);
             refined[i].giveTo(*part[i]);
-            if (refined[i].depth) part[i]->depth = std::move(*refined[i].depth);
+            if (!refined[i].depth) continue;
+            if (room.spool) room.spool->settle();
+            const Image<float> was = std::exchange(part[i]->depth, std::move(*refined[i].depth));
+            renewSurface(*part[i], was);
         }
     }
     if (report.changed() && bundle.bounds) bundle.bounds = bundle.computeBounds();

@@ -14,7 +14,8 @@
 
 namespace stx {
 
-/// The steps, in the order in which they are done.
+/// The steps, in the order in which they are done; of views that are there already, poses and
+/// exposure come before all others.
 enum class RefineStep {
     steps,
     shift,

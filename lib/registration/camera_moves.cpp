@@ -45,6 +45,13 @@ void moveCamera(ViewHeader& view, const CameraMove& move) {
         CameraMove{before.shift + move.shift, glm::normalize(move.turn * before.turn)};
 }
 
+void moveCamera(ReferenceView& view, const CameraMove& move) {
+    moveCamera(static_cast<ViewHeader&>(view), move);
+    for (Image<glm::vec3>* image : {&view.normal, &view.splatU, &view.splatV})
+        for (glm::vec3& vector : image->pixels())
+            vector = glm::vec3(move.turn * glm::dvec3(vector));
+}
+
 Bounds movedBounds(const Bounds& bounds, const Camera& from, const Camera& to) {
     if (bounds.empty() || from == to) return bounds;
     const CameraMove move = moveBetween(from, to);

@@ -12,6 +12,8 @@ namespace stx {
 [[nodiscard]] CameraMove moveBetween(const Camera& from, const Camera& to);
 /// Moves a view's camera, and keeps how, beside earlier moves (Refined::moved).
 void moveCamera(ViewHeader& view, const CameraMove& move);
+/// The same of a view with its images: normals and splat axes, which are in the world, turn along.
+void moveCamera(ReferenceView& view, const CameraMove& move);
 /// Bounds of what a view shows, which had these bounds before its camera moved: of their corners.
 [[nodiscard]] Bounds movedBounds(const Bounds& bounds, const Camera& from, const Camera& to);
 

@@ -272,8 +272,9 @@ Result<PoseRefinement> refinePoses(Bundle& bundle, const PoseRefinementSettings&
     STX_TRY(PoseRefinement result, refinePoses(samples, settings, job));
     if (!result.kept || result.before.pairs == 0) return result;
     for (std::size_t i = 0; i < samples.size(); ++i) {
-        bundle.views[i].camera.position = samples[i].header.camera.position;
-        bundle.views[i].camera.orientation = samples[i].header.camera.orientation;
+        ReferenceView& view = bundle.views[i];
+        const Camera& now = samples[i].header.camera;
+        if (now != view.camera) moveCamera(view, moveBetween(view.camera, now));
     }
     bundle.bounds = bundle.computeBounds();
     return result;

@@ -58,7 +58,7 @@ Tile depthError(const Image<float>& a, const Image<float>& b, glm::ivec2 cell) {
     Tile tile{shrunk(lonely, cell),
               range.empty() ? "nothing in both" : fmt::format("to {:.3g} off", range.most),
               !range.empty()};
-    const auto values = shrunkValues(difference, cell);
+    const auto values = shrunkLargest(difference, cell);
     for (std::size_t i = 0; i < values.count(); ++i)
         if (std::isfinite(values.data()[i]) && tile.picture.data()[i] == kEmptyColour)
             tile.picture.data()[i] = viridis(range.place(values.data()[i]));

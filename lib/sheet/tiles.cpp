@@ -107,6 +107,16 @@ Image<float> shrunkValues(const Image<float>& values, glm::ivec2 cell) {
     });
 }
 
+Image<float> shrunkLargest(const Image<float>& values, glm::ivec2 cell) {
+    return shrunkBy<float>(values.size(), cell, [&](const Under& u) {
+        float largest = -kNoDepth;
+        for (int y = u.from.y; y < u.to.y; ++y)
+            for (int x = u.from.x; x < u.to.x; ++x)
+                if (std::isfinite(values.at(x, y))) largest = std::max(largest, values.at(x, y));
+        return std::isfinite(largest) ? largest : kNoDepth;
+    });
+}
+
 std::string rangeText(const std::string& what, const ValueRange& range) {
     if (range.empty()) return "no " + what;
     return fmt::format("{} {:.4g} to {:.4g}", what, range.least, range.most);

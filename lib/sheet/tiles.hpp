@@ -32,6 +32,8 @@ inline constexpr glm::u8vec3 kEmptyColour{216, 216, 220};
 /// The least of the finite values under each new pixel, where they are at least half of all there;
 /// else infinite.
 [[nodiscard]] Image<float> shrunkValues(const Image<float>& values, glm::ivec2 cell);
+/// The largest of the finite values under each new pixel; infinite where there are none.
+[[nodiscard]] Image<float> shrunkLargest(const Image<float>& values, glm::ivec2 cell);
 
 /// "depth 1.25 to 3.5", or that there is none.
 [[nodiscard]] std::string rangeText(const std::string& what, const ValueRange& range);

@@ -91,7 +91,9 @@ bool project(const SplatCloud& cloud, std::size_t i, const Eye& eye, Projected& 
     }
     const double xx = glm::dot(u, u) + kDilation, xy = glm::dot(u, v),
                  yy = glm::dot(v, v) + kDilation;
-    const double determinant = xx * yy - xy * xy;
+    // xx yy - xy xy, without its cancellation (Lagrange's identity).
+    const glm::dvec3 area = glm::cross(u, v);
+    const double determinant = glm::dot(area, area) + kDilation * (xx + yy - kDilation);
     if (!(determinant > 0) || !std::isfinite(determinant)) return false;
     const double cut = std::min(kCut, 2.0 * std::log(opacity / kLeastAlpha));
     const double halfX = std::sqrt(cut * xx), halfY = std::sqrt(cut * yy);
@@ -101,9 +103,9 @@ bool project(const SplatCloud& cloud, std::size_t i, const Eye& eye, Projected& 
     const glm::vec3 colour = colourOf(cloud, i, c);
     to = {static_cast<float>(x),
           static_cast<float>(y),
-          static_cast<float>(yy / determinant),
-          static_cast<float>(-xy / determinant),
-          static_cast<float>(xx / determinant),
+          static_cast<float>(std::sqrt(yy / determinant)),
+          static_cast<float>(-xy / std::sqrt(yy * determinant)),
+          static_cast<float>(1 / std::sqrt(yy)),
           static_cast<float>(cut),
           static_cast<float>(halfX),
           static_cast<float>(halfY),

@@ -68,10 +68,11 @@ void blendTileImpl(const Projected* splats, const std::uint32_t* order, std::siz
         const VF xx = hn::Set(d, s.xx), opacity = hn::Set(d, s.opacity), cut = hn::Set(d, s.cut);
         for (int row = y0; row <= y1; ++row) {
             const float dy = static_cast<float>(row) - y;
-            const VF ofY = hn::Set(d, s.yy * dy * dy), cross = hn::Set(d, 2.0f * s.xy * dy);
+            const VF ofY = hn::Set(d, s.yy * dy * s.yy * dy), along = hn::Set(d, s.xy * dy);
             for (int column = x0 / lanes * lanes; column <= x1; column += lanes) {
                 const VF dx = hn::Sub(hn::Iota(d, static_cast<float>(column)), hn::Set(d, x));
-                const VF q = hn::MulAdd(hn::MulAdd(xx, dx, cross), dx, ofY);
+                const VF across = hn::MulAdd(xx, dx, along);
+                const VF q = hn::MulAdd(across, across, ofY);
                 auto in = hn::Le(q, cut);
                 if (hn::AllFalse(d, in)) continue;
                 const VF alpha = hn::Min(

@@ -15,8 +15,11 @@ inline constexpr int kTilePixels = kTile * kTile;
 
 /// A splat in the picture.
 struct Projected {
-    float x, y;          ///< its centre, pixels
-    float xx, xy, yy;    ///< inverse of its covariance, per square pixel
+    float x, y;  ///< its centre, pixels
+    /// Factor of the inverse of its covariance, per pixel: at (dx, dy) from the centre are
+    /// (xx dx + xy dy)^2 + (yy dy)^2 squared deviations. Products of the inverse itself would
+    /// cancel in floats along a splat that is a thousand times longer than wide.
+    float xx, xy, yy;
     float cut;           ///< squared deviations beyond which it is not drawn
     float halfX, halfY;  ///< of the box of what is drawn, pixels
     float opacity;       ///< at its centre

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "lib/base/parallel.hpp"
@@ -257,6 +259,33 @@ void smoothWithinSteps(const ReferenceView& view, int radius, int rounds, DepthS
     }
 }
 
+/// Pixels whose slope is not known: a bit for each axis, and one for those that wait to ask again.
+constexpr std::uint8_t kBothAxes = 3, kAsking = 4;
+
+/// The slopes of the neighbour that comes nearest to the depth of an open pixel when it goes on
+/// straight, of those that know what it does not; none where there are none.
+std::optional<glm::vec2> slopeBeside(const DepthSurface& surface, const Image<std::uint8_t>& open,
+                                     glm::ivec2 at) {
+    const std::uint8_t wanted = open.at(at.x, at.y);
+    double nearest = std::numeric_limits<double>::infinity();
+    std::optional<glm::vec2> slope;
+    for (int j = -1; j <= 1; ++j) {
+        for (int i = -1; i <= 1; ++i) {
+            const int x = at.x + i, y = at.y + j;
+            if (!surface.w.contains(x, y) || std::isnan(surface.w.at(x, y)) ||
+                (open.at(x, y) & wanted))
+                continue;
+            const glm::vec2 g = surface.gradient.at(x, y);
+            const double off =
+                std::abs(surface.w.at(x, y) - g.x * i - g.y * j - surface.w.at(at.x, at.y));
+            if (!(off < nearest)) continue;
+            nearest = off;
+            slope = g;
+        }
+    }
+    return slope;
+}
+
 }  // namespace
 
 DepthSurface depthSurface(const ReferenceView& view, const BakeSettings& settings) {
@@ -320,9 +349,8 @@ void continueSlopes(const Camera& camera, DepthSurface& surface) {
         return (surface.links.at(x, y) & bit) ||
                (surface.links.contains(bx, by) && (surface.links.at(bx, by) & bit));
     };
-    // By axis: a bit for each that is not known.
     Image<std::uint8_t> open(width, height, 0);
-    std::vector<glm::ivec2> left;
+    std::vector<glm::ivec2> asking;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             const double w = surface.w.at(x, y);
@@ -331,36 +359,15 @@ void continueSlopes(const Camera& camera, DepthSurface& surface) {
             for (int axis = 0; axis < 2; ++axis)
                 if (!linked(x, y, axis) && surface.gradient.at(x, y)[axis] == facing[axis])
                     open.at(x, y) |= static_cast<std::uint8_t>(1 << axis);
-            if (open.at(x, y)) left.emplace_back(x, y);
+            if (open.at(x, y)) asking.emplace_back(x, y);
         }
     }
     // From those beside known slopes on, so that a strip of several pixels gets them, too.
-    for (std::size_t before = 0; !left.empty() && left.size() != before;) {
-        before = left.size();
+    while (!asking.empty()) {
         std::vector<std::pair<glm::ivec2, glm::vec2>> found;
-        std::vector<glm::ivec2> still;
-        for (const glm::ivec2 at : left) {
-            const std::uint8_t wanted = open.at(at.x, at.y);
-            double nearest = std::numeric_limits<double>::infinity();
-            glm::vec2 slope(0);
-            for (int j = -1; j <= 1; ++j) {
-                for (int i = -1; i <= 1; ++i) {
-                    const int x = at.x + i, y = at.y + j;
-                    if (!surface.w.contains(x, y) || std::isnan(surface.w.at(x, y)) ||
-                        (open.at(x, y) & wanted))
-                        continue;
-                    const glm::vec2 g = surface.gradient.at(x, y);
-                    const double off =
-                        std::abs(surface.w.at(x, y) - g.x * i - g.y * j - surface.w.at(at.x, at.y));
-                    if (!(off < nearest)) continue;
-                    nearest = off;
-                    slope = g;
-                }
-            }
-            if (std::isinf(nearest))
-                still.push_back(at);
-            else
-                found.emplace_back(at, slope);
+        for (const glm::ivec2 at : asking) {
+            open.at(at.x, at.y) &= kBothAxes;
+            if (const auto slope = slopeBeside(surface, open, at)) found.emplace_back(at, *slope);
         }
         for (const auto& [at, slope] : found) {
             for (int axis = 0; axis < 2; ++axis)
@@ -368,7 +375,18 @@ void continueSlopes(const Camera& camera, DepthSurface& surface) {
                     surface.gradient.at(at.x, at.y)[axis] = slope[axis];
             open.at(at.x, at.y) = 0;
         }
-        left = std::move(still);
+        // Only those beside what was found can find more than before.
+        asking.clear();
+        for (const auto& [at, slope] : found) {
+            for (int y = std::max(at.y - 1, 0); y <= std::min(at.y + 1, height - 1); ++y) {
+                for (int x = std::max(at.x - 1, 0); x <= std::min(at.x + 1, width - 1); ++x) {
+                    std::uint8_t& state = open.at(x, y);
+                    if (state == 0 || state > kBothAxes) continue;
+                    state |= kAsking;
+                    asking.emplace_back(x, y);
+                }
+            }
+        }
     }
 }
 

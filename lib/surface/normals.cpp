@@ -14,43 +14,68 @@ glm::dvec3 shortened(glm::dvec3 v, double longest) {
     return length > longest ? v * (longest / length) : v;
 }
 
-void bakeView(ReferenceView& view, const BakeSettings& settings) {
+/// Writes the images of a view that have room: splat axes, and normals if asked for. With `was`
+/// only where the depth is another.
+void writeVectors(ReferenceView& view, const BakeSettings& settings, bool normals,
+                  const Image<float>* was) {
     const Camera& camera = view.camera;
     DepthSurface surface = depthSurface(view, settings);
-    const int width = view.depth.width(), height = view.depth.height();
-    const bool makeNormals = !(settings.keepNormals && view.hasNormals());
-    if (makeNormals) view.normal = Image<glm::vec3>(width, height, glm::vec3(0));
-    view.splatU = Image<glm::vec3>(width, height, glm::vec3(0));
-    view.splatV = Image<glm::vec3>(width, height, glm::vec3(0));
-    parallelFor(0, height, 16, [&](int y) {
-        for (int x = 0; x < width; ++x) {
-            const double w = surface.w.at(x, y);
-            if (std::isnan(w)) continue;
-            const glm::dvec2 gradient = surface.gradient.at(x, y);
-            const PixelSteps steps = planeSteps(camera, x, y, w, gradient);
-            const glm::dvec2 spacing = camera.sampleSpacing(view.depth.at(x, y));
-            const double half = std::sqrt(0.5);
-            view.splatU.at(x, y) = glm::vec3(
-                camera.orientation * (half * shortened(steps.alongX, kMaxSplatTilt * spacing.x)));
-            view.splatV.at(x, y) = glm::vec3(
-                camera.orientation * (half * shortened(steps.alongY, kMaxSplatTilt * spacing.y)));
-        }
+    const auto ofEach = [&](const auto& write) {
+        parallelFor(0, view.depth.height(), 16, [&](int y) {
+            for (int x = 0; x < view.depth.width(); ++x) {
+                const double w = surface.w.at(x, y);
+                if (std::isnan(w) || (was && was->at(x, y) == view.depth.at(x, y))) continue;
+                write(x, y, w, glm::dvec2(surface.gradient.at(x, y)));
+            }
+        });
+    };
+    ofEach([&](int x, int y, double w, glm::dvec2 gradient) {
+        const PixelSteps steps = planeSteps(camera, x, y, w, gradient);
+        const glm::dvec2 spacing = camera.sampleSpacing(view.depth.at(x, y));
+        const auto put = [&](Image<glm::vec3>& to, glm::dvec3 along, double longest) {
+            if (!to.empty())
+                to.at(x, y) =
+                    glm::vec3(camera.orientation * (std::sqrt(0.5) * shortened(along, longest)));
+        };
+        put(view.splatU, steps.alongX, kMaxSplatTilt * spacing.x);
+        put(view.splatV, steps.alongY, kMaxSplatTilt * spacing.y);
     });
-    if (!makeNormals) return;
+    if (!normals) return;
     // Splats cover what is seen of them: at outlines those that face the viewpoint do.
     continueSlopes(camera, surface);
-    parallelFor(0, height, 16, [&](int y) {
-        for (int x = 0; x < width; ++x) {
-            const double w = surface.w.at(x, y);
-            if (!std::isnan(w))
-                view.normal.at(x, y) =
-                    glm::vec3(camera.orientation *
-                              planeNormal(camera, x, y, w, glm::dvec2(surface.gradient.at(x, y))));
-        }
+    ofEach([&](int x, int y, double w, glm::dvec2 gradient) {
+        view.normal.at(x, y) =
+            glm::vec3(camera.orientation * planeNormal(camera, x, y, w, gradient));
     });
 }
 
+void bakeView(ReferenceView& view, const BakeSettings& settings) {
+    const bool makeNormals = !(settings.keepNormals && view.hasNormals());
+    const auto room = [&] {
+        return Image<glm::vec3>(view.depth.width(), view.depth.height(), glm::vec3(0));
+    };
+    if (makeNormals) view.normal = room();
+    view.splatU = room();
+    view.splatV = room();
+    writeVectors(view, settings, makeNormals, nullptr);
+}
+
+/// Zero where a depth was and none is.
+template <class T>
+void clearLost(Image<T>& image, const Image<float>& depth, const Image<float>& was) {
+    for (std::size_t i = 0; i < image.count(); ++i)
+        if (hasPoint(was.data()[i]) && !hasPoint(depth.data()[i])) image.data()[i] = T(0);
+}
+
 }  // namespace
+
+void renewSurface(ReferenceView& view, const Image<float>& was) {
+    for (Image<glm::vec3>* image : {&view.normal, &view.splatU, &view.splatV, &view.emissive})
+        clearLost(*image, view.depth, was);
+    clearLost(view.metallicRoughness, view.depth, was);
+    if (view.hasNormals() || !view.splatU.empty() || !view.splatV.empty())
+        writeVectors(view, {}, view.hasNormals(), &was);
+}
 
 Result<ViewChange> bakeOfViews(const BakeSettings& settings, const PeakMemory& takes) {
     if (!(settings.discontinuity > 0 && settings.discontinuity <= 1))

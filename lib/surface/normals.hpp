@@ -35,6 +35,11 @@ struct BakeSettings {
 ///
 /// Errors: a bundle that fails check(), settings out of range, cancelled, memory over the limit.
 [[nodiscard]] Result<void> bake(Bundle& bundle, const BakeSettings& settings, Job& job);
+/// Makes what a view has of normals and splat axes follow its depth where that is not `was` any
+/// more: as bake() makes them of the view as it is now; zero, and
+/// its material, too, where the point is gone. All else stays, to the bit: normals of a mesh are
+/// better than those of depth.
+void renewSurface(ReferenceView& view, const Image<float>& was);
 /// The same of views one by one. `takes` is what the memory of a view must have room for: also what
 /// is done with it then. Errors (usage): settings out of range.
 [[nodiscard]] Result<ViewChange> bakeOfViews(const BakeSettings& settings,

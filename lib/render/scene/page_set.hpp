@@ -130,9 +130,10 @@ class PageSet {
                                      RefineStepReport& report) const;
     /// Whether refined() may change something. Looks at one view after the other.
     [[nodiscard]] bool mayRefine(const RefineSettings& settings) const;
-    /// The same with the depth of its views refined, those behind it not: the very same where depth
-    /// is exact. `report`, if any, tells what was found and changed. Works on `atOnce` views at a
-    /// time (RefineRoom); 0: any number.
+    /// The same with the depth of its views refined, those behind it not, and normals and splat
+    /// axes that follow it (renewSurface()): the very same where depth is exact. `report`, if any,
+    /// tells what was found and changed. Works on `atOnce` views at a time (RefineRoom); 0: any
+    /// number.
     [[nodiscard]] PageSet refined(const RefineSettings& settings, RefineReport* report = nullptr,
                                   std::int64_t atOnce = 0) const;
     /// The same before another background, behind its own: what views with measured depth show
@@ -246,6 +247,8 @@ class PageSet {
         std::vector<const Texture*> captured;  ///< by page; empty: those of the pages
         std::vector<std::shared_ptr<const Image<float>>>
             refined;  ///< depth of refined() and withoutCoarse()
+        /// Normals and splat axes of refined().
+        std::vector<std::shared_ptr<const Image<glm::vec3>>> renewed;
     };
     explicit PageSet(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
     [[nodiscard]] PageSet only(const std::vector<bool>& kept) const;

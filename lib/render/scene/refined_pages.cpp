@@ -1,11 +1,66 @@
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <map>
+#include <utility>
 
 #include "lib/base/parallel.hpp"
 #include "lib/refine/refine_depth.hpp"
 #include "lib/render/scene/view_images.hpp"
+#include "lib/surface/normals.hpp"
 
 namespace stx {
+namespace {
+
+/// Normals and splat axes of pages, where they follow the depth of refined views.
+class RenewedPages {
+  public:
+    explicit RenewedPages(const PageSet& set) : set_(set) {}
+
+    /// Of a view with a header and a depth that are new.
+    void renew(std::size_t number, const ViewHeader& header, const Image<float>& was,
+               const Image<float>& depth) {
+        if (!set_.views()[number].hasNormals && !set_.views()[number].hasSplats) return;
+        set_.settle();
+        ReferenceView view = set_.copyOfView(number);
+        static_cast<ViewHeader&>(view) = header;
+        view.texture = {};
+        view.depth = depth;
+        renewSurface(view, was);
+        const std::array images = {&view.normal, &view.splatU, &view.splatV};
+        for (std::size_t k = 0; k < images.size(); ++k) {
+            if (images[k]->empty()) continue;
+            for (const PageRectangle& r : set_.rectanglesOf(number))
+                putOnPage(*images[k], depth, r, pageOf(r.page, k));
+        }
+    }
+
+    void giveTo(std::vector<Page>& pages,
+                std::vector<std::shared_ptr<const Image<glm::vec3>>>& keeps) {
+        for (auto& [at, image] : images_) {
+            pages[at.first].*kKinds[at.second] = image.get();
+            keeps.push_back(std::move(image));
+        }
+    }
+
+  private:
+    static constexpr const Image<glm::vec3>* Page::*kKinds[] = {&Page::normal, &Page::splatU,
+                                                                &Page::splatV};
+
+    Image<glm::vec3>& pageOf(int page, std::size_t kind) {
+        auto& image = images_[{page, kind}];
+        if (!image) {
+            image = std::make_shared<Image<glm::vec3>>(*(set_.pages()[page].*kKinds[kind]));
+            image->moveTo(set_.spool());
+        }
+        return *image;
+    }
+
+    const PageSet& set_;
+    std::map<std::pair<int, std::size_t>, std::shared_ptr<Image<glm::vec3>>> images_;
+};
+
+}  // namespace
 
 RefineView viewImages(const PageSet& set, std::size_t number, ReferenceView& copy) {
     const PageView& view = set.views()[number];
@@ -21,19 +76,6 @@ RefineView viewImages(const PageSet& set, std::size_t number, ReferenceView& cop
             for (int x = r.x0; x < r.x1; ++x) copy.depth.at(x, y) = depth[r.texel(x, y)];
     }
     return {&view, &copy.texture, &copy.depth};
-}
-
-void putDepth(const Image<float>& depth, const PageRectangle& r, Image<float>& page) {
-    const int x0 = std::max(r.x0 - PageSet::kPadding, 0),
-              x1 = std::min(r.x1 + PageSet::kPadding, depth.width());
-    const int y0 = std::max(r.y0 - PageSet::kPadding, 0),
-              y1 = std::min(r.y1 + PageSet::kPadding, depth.height());
-    for (int y = y0; y < y1; ++y)
-        for (int x = x0; x < x1; ++x) {
-            const bool inside = x >= r.x0 && y >= r.y0 && x < r.x1 && y < r.y1;
-            // Padding may repeat pixels that no rectangle shows.
-            if (inside || hasPoint(depth.at(x, y))) page.data()[r.texel(x, y)] = depth.at(x, y);
-        }
 }
 
 bool PageSet::mayRefine(const RefineSettings& settings) const {
@@ -92,10 +134,12 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report,
     if (!found.changed()) return *this;
     auto data = std::make_shared<Data>(*data_);
     std::vector<std::shared_ptr<Image<float>>> depths(data->pages.size());
+    RenewedPages renewed(*this);
     for (std::size_t i = 0; i < better.size(); ++i) {
         found.record(better[i].refined);
         better[i].giveTo(data->views[i]);
         if (!better[i].depth) continue;
+        renewed.renew(i, data->views[i], *given[i].depth, *better[i].depth);
         for (const PageRectangle& r : rectanglesOf(i)) {
             auto& depth = depths[r.page];
             const auto page = static_cast<std::size_t>(r.page);
@@ -104,9 +148,10 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report,
                 break;
             }
             if (!depth) depth = std::make_shared<Image<float>>(*data_->pages[page].depth);
-            putDepth(*better[i].depth, r, *depth);
+            putOnPage(*better[i].depth, *better[i].depth, r, *depth);
         }
     }
+    renewed.giveTo(data->pages, data->renewed);
     return withDepths(std::move(data), std::move(depths));
 }
 

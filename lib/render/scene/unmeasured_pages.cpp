@@ -42,7 +42,7 @@ PageSet PageSet::withUnmeasured(const PageSet& captured, std::int64_t& pixels) c
             }
             const Page& own = data_->pages[page];
             if (!depth) depth = std::make_shared<Image<float>>(own.width(), own.height(), kNoDepth);
-            putDepth(found.depth[i], r, *depth);
+            putOnPage(found.depth[i], found.depth[i], r, *depth);
         }
     }
     for (std::size_t i = 0; i < depths.size(); ++i) {

@@ -230,6 +230,30 @@ TEST(BehindPhoto, FromTheSideTheWallIsThereAndNoBorder) {
     }
 }
 
+// A part that was cut from the side of a photograph: the border was as wide as in its middle.
+TEST(BehindPhoto, BesideTheAxisTheBorderIsWideEnough) {
+    ReferenceView photo = cardBeforeWall(false);
+    photo.camera.fx = photo.camera.fy = 200;
+    photo.camera.cx = 12;
+    Bundle bundle;
+    bundle.views = {photo};
+    Job job;
+    ASSERT_TRUE(addBehind(bundle, {25}, job));
+    // What is in the middle of the frame stays there.
+    const double middle = (0.5 * kPhotoWidth - photo.camera.cx) / photo.camera.fx;
+    for (const double eye : {-0.25, 0.25}) {
+        Camera camera = photo.camera;
+        camera.position.x += eye * kFarWall;
+        const double turn = std::atan(middle) - std::atan(middle - eye);
+        camera.orientation = glm::angleAxis(turn, glm::dvec3(0, 1, 0));
+        const Image<glm::vec4> picture = drawn(bundle, camera, Fill::none);
+        int empty = 0;
+        for (int y = 20; y < kPhotoHeight - 20; ++y)
+            for (int x = 0; x < kPhotoWidth; ++x) empty += picture.at(x, y).a < 0.99f;
+        EXPECT_EQ(empty, 0) << eye;
+    }
+}
+
 TEST(BehindPhoto, ThingsThatAreNotPhotographsAreRefused) {
     Job job;
     ReferenceView view = cardBeforeWall(true);

@@ -10,6 +10,7 @@
 #include "lib/model/view_table.hpp"
 #include "lib/refine/refine.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
+#include "lib/surface/normals.hpp"
 #include "tests/noisy_depth.hpp"
 #include "tests/torus_bundle.hpp"
 
@@ -51,6 +52,9 @@ void expectSame(const Bundle& a, const Bundle& b, const std::string& what) {
         const ReferenceView &one = a.views[v], &other = b.views[v];
         EXPECT_EQ(one.depth, other.depth) << what << ", view " << v;
         EXPECT_EQ(one.texture, other.texture) << what << ", view " << v;
+        EXPECT_EQ(one.normal, other.normal) << what << ", view " << v;
+        EXPECT_EQ(one.splatU, other.splatU) << what << ", view " << v;
+        EXPECT_EQ(one.splatV, other.splatV) << what << ", view " << v;
         EXPECT_EQ(one.camera, other.camera) << what << ", view " << v;
         EXPECT_EQ(one.refined, other.refined) << what << ", view " << v;
         EXPECT_EQ(one.noDepth, other.noDepth) << what << ", view " << v;
@@ -111,6 +115,10 @@ TEST(RefineInSpool, IsTheSameAsInMemory) {
     for (const RefineStep step :
          {RefineStep::noise, RefineStep::silhouettes, RefineStep::agree, RefineStep::colours})
         EXPECT_GT(noise.of(step).views, 0) << infoOf(step).name;
+    Job job;
+    Bundle baked = spoiled("noise1");
+    ASSERT_TRUE(bake(baked, {}, job));
+    EXPECT_TRUE(expectSameInSpool(baked, {}, "baked").changed());
     const auto edges = expectSameInSpool(spoiled("edges1"), {}, "edges");
     EXPECT_GT(edges.of(RefineStep::edges).views, 0);
     const auto light = expectSameInSpool(spoiled("light"), {}, "light");

@@ -13,6 +13,7 @@
 #include "lib/packing/prune.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/scene/page_set.hpp"
+#include "lib/surface/normals.hpp"
 #include "tests/noisy_depth.hpp"
 
 namespace stx {
@@ -141,6 +142,44 @@ TEST(Refine, ABundleIsRefinedOnce) {
     const auto third = refine(better, RefineSettings::all(), job);
     ASSERT_TRUE(third);
     EXPECT_FALSE(third->changed()) << third->text();
+}
+
+// They were those of the noise: drawn in light 18.9 dB, with none at all 31.9.
+TEST(Refine, NormalsAndSplatAxesFollowTheDepth) {
+    Job job;
+    Bundle baked = noisyRoom(), expected = noisyRoom();
+    ASSERT_TRUE(bake(baked, {}, job));
+    const Bundle given = baked;
+    ASSERT_TRUE(refine(baked, {}, job));
+    ASSERT_TRUE(refine(expected, {}, job));
+    ASSERT_TRUE(bake(expected, {}, job));
+    const PageSet pages = PageSet(given).refined({});
+    const auto atlas = pack(given, {}, job);
+    ASSERT_TRUE(atlas) << atlas.error().text();
+    const auto packed = PageSet::of(*atlas, job);
+    ASSERT_TRUE(packed);
+    const PageSet ofAtlas = packed->refined({});
+    std::size_t same = 0, count = 0;
+    for (std::size_t v = 0; v < given.views.size(); ++v) {
+        const ReferenceView &is = baked.views[v], &was = given.views[v];
+        for (const Image<glm::vec3> ReferenceView::*kind :
+             {&ReferenceView::normal, &ReferenceView::splatU, &ReferenceView::splatV})
+            for (std::size_t i = 0; i < was.depth.count(); ++i) {
+                const bool stays = was.depth.data()[i] == is.depth.data()[i];
+                ASSERT_EQ((is.*kind).data()[i],
+                          ((stays ? was : expected.views[v]).*kind).data()[i]);
+                same += stays;
+                ++count;
+            }
+        EXPECT_EQ(*pages.pages()[v].normal, is.normal);
+        EXPECT_EQ(*pages.pages()[v].splatU, is.splatU);
+        EXPECT_EQ(*pages.pages()[v].splatV, is.splatV);
+        const ReferenceView copy = ofAtlas.copyOfView(v);
+        EXPECT_EQ(copy.depth, is.depth);
+        EXPECT_EQ(copy.normal, is.normal);
+        EXPECT_EQ(copy.splatV, is.splatV);
+    }
+    EXPECT_LT(same, count / 10);
 }
 
 TEST(Refine, BackgroundsAreOfOtherTimes) {

@@ -127,6 +127,21 @@ TEST(CameraMoves, OneAfterTheOtherAreOneMove) {
     expectNear(once.camera, view.camera, 1e-12);
 }
 
+TEST(CameraMoves, NormalsAndSplatAxesTurnAlong) {
+    ReferenceView view;
+    view.camera = cameraFrom({1, 1, 2});
+    const glm::dvec3 given(0.6, 0, 0.8);  // as the camera has it
+    for (Image<glm::vec3>* image : {&view.normal, &view.splatU, &view.splatV})
+        *image = Image<glm::vec3>(2, 1, glm::vec3(view.camera.orientation * given));
+    view.normal.at(1, 0) = glm::vec3(0);
+    moveCamera(view, someMove(0.2));
+    EXPECT_TRUE(view.refined.moved);
+    for (const Image<glm::vec3>* image : {&view.normal, &view.splatU, &view.splatV})
+        EXPECT_LT(glm::distance(glm::dvec3(image->at(0, 0)), view.camera.orientation * given),
+                  1e-6);
+    EXPECT_EQ(view.normal.at(1, 0), glm::vec3(0));
+}
+
 TEST(CameraMoves, BoundsHoldWhatAMovedViewShows) {
     const Camera from = cameraFrom({0, 0, 2});
     ViewHeader view;

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/base/parallel.hpp"
+#include "lib/refine/poses.hpp"
 #include "lib/registration/refine_poses.hpp"
 
 using namespace stx;
@@ -135,6 +136,27 @@ TEST(RefinePoses, ColoursAlignAWallThatIsNearlyFlat) {
         EXPECT_LT(left.turn, glm::radians(0.02)) << relief;
         EXPECT_LT(left.shift, 0.001) << relief;
     }
+}
+
+// They are in the world: left as they were, pictures in light are of surfaces that are turned.
+TEST(RefinePoses, NormalsTurnWithTheirCameras) {
+    const glm::dvec3 given(0.6, 0, 0.8);  // as the camera has it
+    Bundle bundle = wall();
+    disturb(bundle, glm::radians(1.0), 0.02);
+    for (ReferenceView& view : bundle.views)
+        view.normal = Image<glm::vec3>(view.depth.width(), view.depth.height(),
+                                       glm::vec3(view.camera.orientation * given));
+    Bundle aligned = bundle;
+    Job job;
+    ASSERT_TRUE(refinePoses(bundle, {}, job));
+    const auto report = alignPoses(aligned, AlignPoses::asked, job);
+    ASSERT_TRUE(report);
+    EXPECT_EQ(report->views, 5);
+    for (const Bundle* done : {&bundle, &aligned})
+        for (const ReferenceView& view : done->views)
+            EXPECT_LT(
+                glm::distance(glm::dvec3(view.normal.at(100, 80)), view.camera.orientation * given),
+                1e-6);
 }
 
 TEST(RefinePoses, RightPosesStay) {

@@ -1,5 +1,6 @@
 #include "lib/sheet/sheet.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 
 #include <gtest/gtest.h>
@@ -249,6 +250,24 @@ TEST(Sheet, OfAPairShowsDepthThatOnlyOneHas) {
     EXPECT_EQ(lonely, 40);
 }
 
+// The least under each pixel was shown: an error of one pixel was none.
+TEST(Sheet, OfAPairShowsTheLargestErrorOfDepth) {
+    const auto bright = [](int errors) {
+        auto pairs = onePair(Rgba8Image(800, 800), Rgba8Image(800, 800));
+        pairs[0].depthA = pairs[0].depthB = Image<float>(800, 800, 2.0f);
+        for (int i = 0; i < errors; ++i)
+            pairs[0].depthB.at(15 + i % 20 * 40, 15 + i / 20 * 40) = 5.0f;
+        Job job;
+        SheetSettings settings;
+        settings.mostSize = {1300, 900};
+        const auto sheet = sheetOf(pairs, settings, job);
+        EXPECT_TRUE(sheet) << sheet.error().text();
+        EXPECT_TRUE(!sheet || holdsText(sheet->picture, "to 3 off"));
+        return sheet ? std::ranges::count(sheet->picture.pixels(), viridis(1)) : 0;
+    };
+    EXPECT_EQ(bright(400) - bright(1), 399);
+}
+
 TEST(Canvas, CutsTextThatIsTooLongAndWhatLiesOutside) {
     Canvas canvas(70, 20, {255, 255, 255});
     canvas.text({0, 0}, "a very long name", {0, 0, 0}, 70);
@@ -291,6 +310,19 @@ TEST(Tiles, KeepTheShapeOfTheirPictures) {
     EXPECT_EQ(sizeInCell({1000, 500}, {200, 200}), glm::ivec2(200, 100));
     EXPECT_EQ(sizeInCell({30, 20}, {100, 100}), glm::ivec2(90, 60));
     EXPECT_EQ(sizeInCell({1, 5000}, {100, 100}), glm::ivec2(1, 100));
+}
+
+TEST(Tiles, ShrinkToTheLeastOrTheLargest) {
+    Image<float> values(4, 2, 1.0f);
+    values.at(0, 1) = 3.0f;
+    for (const glm::ivec2 at : {glm::ivec2(2, 0), glm::ivec2(3, 0), glm::ivec2(3, 1)})
+        values.at(at.x, at.y) = kNoDepth;
+    const auto least = shrunkValues(values, {2, 1}), largest = shrunkLargest(values, {2, 1});
+    EXPECT_EQ(least.at(0, 0), 1.0f);
+    EXPECT_EQ(largest.at(0, 0), 3.0f);
+    EXPECT_FALSE(hasPoint(least.at(1, 0)));
+    EXPECT_EQ(largest.at(1, 0), 1.0f);
+    EXPECT_FALSE(hasPoint(shrunkLargest(Image<float>(2, 2, kNoDepth), {1, 1}).at(0, 0)));
 }
 
 TEST(Tiles, ShrinkColoursInLinearLight) {

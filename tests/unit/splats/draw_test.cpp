@@ -170,6 +170,37 @@ TEST(DrawSplats, OrthographicCamerasTooOnEveryKindOfVectors) {
     onEveryTarget([&] { expectTruth(cloud, camera); });
 }
 
+// Their centres are thousands of pixels outside: lines came out as dots, or not at all.
+TEST(DrawSplats, NeedlesThatOnlyPassThroughThePictureAreWhole) {
+    Camera camera = cameraFrom({0, 0, 3}, 104, 104);
+    camera.orthographic = true;
+    camera.fx = camera.fy = 37;
+    for (const double degrees : {0.02, 37.0, 89.98, 120.0}) {
+        const double angle = glm::radians(degrees);
+        SplatCloud cloud;
+        ASSERT_TRUE(cloud.resize(1, 0, Limits()));
+        cloud.positions[0] = 150.0f * glm::vec3(std::cos(angle), std::sin(angle), 0);
+        cloud.rotations[0] =
+            glm::vec4(0, 0, std::sin(angle / 2), std::cos(angle / 2));  // x, y, z, w
+        cloud.scales[0] = {100.0f, 0.002f, 0.002f};
+        cloud.opacities[0] = 0.95f;
+        cloud.colours[0] = glm::vec3(1);
+        const Truth truth = truthOf(cloud, camera);
+        onEveryTarget([&] {
+            Job job;
+            const auto drawn = drawSplats(cloud, camera, false, job);
+            ASSERT_TRUE(drawn);
+            int lit = 0;
+            for (std::size_t i = 0; i < truth.colour.count(); ++i) {
+                const double expected = truth.colour.data()[i].w;
+                lit += expected > 0.1;
+                EXPECT_NEAR(drawn->colour.data()[i].w, expected, 0.015) << degrees << ' ' << i;
+            }
+            EXPECT_GE(lit, 100) << degrees;
+        });
+    }
+}
+
 TEST(DrawSplats, TheSameOnAnyNumberOfThreads) {
     const SplatCloud cloud = randomCloud(200000, 1, 9);
     const Camera camera = cameraFrom({0, 0.5, 2.5}, 200, 200);

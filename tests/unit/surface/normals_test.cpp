@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/base/parallel.hpp"
+#include "lib/surface/depth_gradient.hpp"
 #include "tests/unit/surface/analytic.hpp"
 
 namespace stx {
@@ -149,6 +150,23 @@ TEST(Normals, GoOnOverOutlines) {
     }
 }
 
+// Each round looked at all that was left: time grew with the pixels to the power of 1.5.
+TEST(Normals, SlopesGoOnFarInTimeThatGrowsWithThePixels) {
+    constexpr int kSide = 1200, kKnown = 6;
+    const float levels[] = {1.0f, 1.6f, 2.4f, 3.6f, 5.4f, 8.1f};
+    ReferenceView view;
+    view.camera = Camera::fromFieldOfView({0, 0, 0}, {1, 0, 0, 0}, {0.9, 0.9}, false, kSide, kSide);
+    view.depthBits = 32;
+    view.depth = Image<float>(kSide, kSide);
+    for (int y = 0; y < kSide; ++y)
+        for (int x = 0; x < kSide; ++x)
+            view.depth.at(x, y) = x < kKnown && y < kKnown ? 1.0f : levels[x % 2 * 3 + y % 3];
+    DepthSurface surface = depthSurface(view, {});
+    EXPECT_NE(surface.gradient.at(kSide - 1, kSide - 1), glm::vec2(0)) << "it faces the viewpoint";
+    continueSlopes(view.camera, surface);
+    for (const glm::vec2 gradient : surface.gradient.pixels()) ASSERT_EQ(gradient, glm::vec2(0));
+}
+
 TEST(Normals, LonelyPointsFaceTheViewpoint) {
     Bundle bundle;
     ReferenceView view;
@@ -192,6 +210,58 @@ TEST(Splats, AreTangentAndCloseTheLattice) {
         }
         EXPECT_GT(looked, 5000);
     }
+}
+
+TEST(RenewSurface, FollowsDepthThatChangedAndLeavesAllElse) {
+    Job job;
+    Bundle bundle;
+    bundle.views.push_back(
+        analytic::capture(analytic::sphere, analytic::lookingAt({1.2, 0.8, 2.8}, 64), 32));
+    ASSERT_TRUE(bake(bundle, {}, job));
+    ReferenceView& view = bundle.views[0];
+    view.metallicRoughness = Image<glm::vec2>(64, 64, glm::vec2(0.5f));
+    view.emissive = Image<glm::vec3>(64, 64, glm::vec3(0.25f));
+    // Of a mesh: depth does not tell them.
+    for (glm::vec3& normal : view.normal.pixels()) normal = -normal;
+    const ReferenceView before = view;
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 32; ++x) view.depth.at(x, y) *= 1 + 0.004f * static_cast<float>(x);
+    view.depth.at(40, 32) = kNoDepth;
+    Bundle fresh;
+    fresh.views = {view};
+    ASSERT_TRUE(bake(fresh, {}, job));
+    renewSurface(view, before.depth);
+    int changed = 0;
+    for (int y = 0; y < 64; ++y) {
+        for (int x = 0; x < 64; ++x) {
+            const bool same = view.depth.at(x, y) == before.depth.at(x, y);
+            const ReferenceView& expected = same ? before : fresh.views[0];
+            ASSERT_EQ(view.normal.at(x, y), expected.normal.at(x, y)) << x << ' ' << y;
+            ASSERT_EQ(view.splatU.at(x, y), expected.splatU.at(x, y)) << x << ' ' << y;
+            ASSERT_EQ(view.splatV.at(x, y), expected.splatV.at(x, y)) << x << ' ' << y;
+            changed += !same;
+        }
+    }
+    EXPECT_GT(changed, 500);
+    EXPECT_EQ(view.normal.at(40, 32), glm::vec3(0));
+    EXPECT_EQ(view.metallicRoughness.at(40, 32), glm::vec2(0));
+    EXPECT_EQ(view.emissive.at(40, 32), glm::vec3(0));
+    EXPECT_EQ(view.metallicRoughness.at(41, 32), glm::vec2(0.5f));
+    EXPECT_EQ(view.emissive.at(20, 32), glm::vec3(0.25f));
+}
+
+TEST(RenewSurface, GivesAViewNoImagesThatItLacks) {
+    ReferenceView view =
+        analytic::capture(analytic::sphere, analytic::lookingAt({1.2, 0.8, 2.8}, 16), 32);
+    const Image<float> before = view.depth;
+    view.depth.at(8, 8) *= 1.1f;
+    renewSurface(view, before);
+    EXPECT_TRUE(view.normal.empty() && view.splatU.empty() && view.emissive.empty());
+    view.splatV = Image<glm::vec3>(16, 16, glm::vec3(0));
+    renewSurface(view, before);
+    EXPECT_NE(view.splatV.at(8, 8), glm::vec3(0));
+    EXPECT_EQ(view.splatV.at(7, 8), glm::vec3(0));
+    EXPECT_TRUE(view.normal.empty() && view.splatU.empty());
 }
 
 TEST(Normals, RgbRoundTrip) {
