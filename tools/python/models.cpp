@@ -36,8 +36,8 @@ auto ofView(I ReferenceView::*image) {
     return [image](const HeldView& v) { return arrayOf((*v.view).*image, v.view); };
 }
 /// A property that is the value of a member.
-template <class T>
-auto valueOfView(T ReferenceView::*value) {
+template <class T, class C>
+auto valueOfView(T C::*value) {
     return [value](const HeldView& v) { return (*v.view).*value; };
 }
 

@@ -124,8 +124,8 @@ TEST(VideoFrames, TheFrameBeforeADamagedOneStandsForIt) {
 
 TEST(VideoFrames, DamagedFramesAreReadOnceAndCountedWhereTheyAreAskedFor) {
     TemporaryFolder folder;
-    constexpr int kCount = 60, kSound = 20;
-    for (int k = 0; k < kCount; ++k) {
+    constexpr int kFrames = 60, kSound = 20;
+    for (int k = 0; k < kFrames; ++k) {
         const auto file = folder / fmt::format("f{:02}.png", k);
         if (k < kSound)
             writePng(file, ramp(8, 6, k));
