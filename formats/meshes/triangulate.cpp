@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 
 namespace stx {
 namespace {
@@ -93,22 +94,20 @@ class CornerGrid {
     std::vector<std::vector<std::uint32_t>> squares_;
 };
 
-/// Of three corners or more.
-void cut(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& triangles) {
-    const auto n = static_cast<std::uint32_t>(corners.size());
-    std::vector<std::uint32_t> rest(n), next(n), previous(n);
+bool isConvex(std::span<const glm::dvec2> flat) {
+    const std::size_t n = flat.size();
+    for (std::size_t i = 0; i < n; ++i)
+        if (!(cross(flat[i], flat[(i + 1) % n], flat[(i + 2) % n]) >= 0)) return false;
+    return true;
+}
+
+void cutEars(std::span<const glm::dvec2> flat, std::vector<glm::uvec3>& triangles) {
+    const auto n = static_cast<std::uint32_t>(flat.size());
+    std::vector<std::uint32_t> next(n), previous(n);
     for (std::uint32_t i = 0; i < n; ++i) {
-        rest[i] = i;
         next[i] = (i + 1) % n;
         previous[i] = (i + n - 1) % n;
     }
-    if (n == 3) return fan(rest, triangles);
-    const auto flat = flatten(corners);
-    bool convex = true;
-    for (std::size_t i = 0; i < n; ++i)
-        convex = convex && cross(flat[i], flat[(i + 1) % n], flat[(i + 2) % n]) >= 0;
-    if (convex) return fan(rest, triangles);
-
     // Of a drawing each ear takes a few steps, 1000 where its corners are badly spread. What takes
     // more is an attack.
     constexpr std::uint64_t kMostSteps = 1 << 16;  // for each corner
@@ -130,7 +129,7 @@ void cut(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& triangles
             ++misses;
         }
     }
-    rest.resize(left);
+    std::vector<std::uint32_t> rest(left);
     for (auto& corner : rest) {
         corner = at;
         at = next[at];
@@ -142,18 +141,22 @@ void cut(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& triangles
 }  // namespace
 
 void triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& triangles) {
-    const std::size_t n = corners.size();
+    const auto n = static_cast<std::uint32_t>(corners.size());
     if (n < 3) return;
-    // A corner that is there twice is no ear, and keeps its neighbours from being one.
-    std::vector<std::uint32_t> apart;
-    for (std::uint32_t i = 0; i < n; ++i)
-        if (corners[i] != corners[(i + 1) % n]) apart.push_back(i);
-    if (apart.size() == n || apart.size() < 3) return cut(corners, triangles);
-    std::vector<glm::dvec3> places;
-    places.reserve(apart.size());
-    for (const auto i : apart) places.push_back(corners[i]);
+    std::vector<std::uint32_t> all(n), apart;
+    std::iota(all.begin(), all.end(), 0u);
+    if (n == 3) return fan(all, triangles);
+    const auto flat = flatten(corners);
+    // A corner that is there twice does not look like one of a notch, and is no ear.
+    std::vector<glm::dvec2> places;
+    for (const auto i : all) {
+        if (corners[i] == corners[(i + 1) % n]) continue;
+        apart.push_back(i);
+        places.push_back(flat[i]);
+    }
+    if (isConvex(places)) return fan(all, triangles);
     const std::size_t before = triangles.size();
-    cut(places, triangles);
+    cutEars(places, triangles);
     for (auto& t : std::span(triangles).subspan(before)) t = {apart[t.x], apart[t.y], apart[t.z]};
 }
 

@@ -289,10 +289,10 @@ class XmtWriter {
     static std::string fieldName(const NodePtr& node, int field) {
         return node->info->fields[field].name;
     }
-    void writeRoute(const Route& route) {
+    void writeRoute(const Route& route) { writeRoute(route, scope_.names.define(route)); }
+    void writeRoute(const Route& route, std::string name) {
         Attributes attributes;
-        if (std::string text = scope_.names.define(route); !text.empty())
-            attributes.push_back({"DEF", std::move(text)});
+        if (!name.empty()) attributes.push_back({"DEF", std::move(name)});
         attributes.push_back({"fromNode", nameOf(route.from)});
         attributes.push_back({"fromField", fieldName(route.from, route.fromField)});
         attributes.push_back({"toNode", nameOf(route.to)});
@@ -344,7 +344,7 @@ class XmtWriter {
     }
     void write(const ReplaceRoute& c) {
         open("Replace", {{"atRoute", scope_.names.routeOf(c.routeId)}});
-        writeRoute(c.route);
+        writeRoute(c.route, "");  // it keeps its name
         close("Replace");
     }
     void write(const InsertNode& c) {

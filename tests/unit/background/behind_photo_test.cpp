@@ -246,7 +246,7 @@ TEST(BehindPhoto, BesideTheAxisTheBorderIsWideEnough) {
         camera.position.x += eye * kFarWall;
         const double turn = std::atan(middle) - std::atan(middle - eye);
         camera.orientation = glm::angleAxis(turn, glm::dvec3(0, 1, 0));
-        const Image<glm::vec4> picture = drawn(bundle, camera, Fill::none);
+        const Image<glm::vec4> picture = drawn(bundle, camera);
         int empty = 0;
         for (int y = 20; y < kPhotoHeight - 20; ++y)
             for (int x = 0; x < kPhotoWidth; ++x) empty += picture.at(x, y).a < 0.99f;

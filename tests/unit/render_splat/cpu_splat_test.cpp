@@ -212,22 +212,6 @@ TEST(CpuSplat, TheFrontHidesTheBackFromFarAway) {
     }
 }
 
-TEST(CpuSplat, AnOrthographicPictureIsTheSameFromAnyDistance) {
-    const Bundle bundle = analyticBundle(AnalyticScene::object, 9);
-    const auto from = [&](double distance) {
-        const glm::dvec3 eye = distance * glm::normalize(glm::dvec3(0.3, 0.5, 1));
-        return drawn(bundle, cameraAt(eye, {0, 0, 0}, 128, 3.0, true), splatSettings());
-    };
-    const Frame near = from(4);
-    for (const double distance : {40.0, 400.0}) {
-        const auto same = compare(from(distance).colour, near.colour);
-        ASSERT_TRUE(same);
-        RecordProperty(fmt::format("from {}", distance),
-                       fmt::format("{:.1f} dB", same->psnrRgb.value_or(99)));
-        EXPECT_GT(same->psnrRgb.value_or(99), 50.0) << distance;
-    }
-}
-
 // What share of the quarters of each view's blocks a picture needs.
 std::vector<double> neededOf(const Bundle& bundle, const Camera& novel) {
     const PageSet set(bundle);

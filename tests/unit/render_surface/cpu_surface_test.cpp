@@ -552,26 +552,6 @@ TEST(CpuSurface, DepthAndLitNormalsFollowTheSurface) {
     EXPECT_LT(angle / count, 0.03);
 }
 
-/// Pixels of a view that are covered in part have no depth of their own, and were not lit.
-TEST(CpuSurface, InLightASourcesOwnPoseIsAsTheOneBeside) {
-    const Bundle bundle = bundleOf(ball, around());
-    RenderSettings settings;
-    settings.lighting.lights.push_back({.kind = Light::Kind::directional, .vector = {1, 0, 0.2f}});
-    settings.lighting.ambient = glm::vec3(0.05f);
-    for (const std::size_t view : {0u, 1u, 3u}) {
-        const Camera own = bundle.views[view].camera;
-        Camera beside = own;
-        beside.position += own.orientation * glm::dvec3(1e-3, 0, 0);
-        const Frame a = draw(bundle, own, settings), b = draw(bundle, beside, settings);
-        float most = 0;
-        for (std::size_t i = 0; i < a.colour.count(); ++i) {
-            const glm::vec4 d = glm::abs(a.colour.data()[i] - b.colour.data()[i]);
-            most = std::max({most, d.r, d.g, d.b});
-        }
-        EXPECT_LT(most, 0.1f) << view;
-    }
-}
-
 TEST(CpuSurface, CoarseDepthCodesStillGiveAClosedSurface) {
     Bundle bundle = bundleOf(ball, around());
     for (ReferenceView& view : bundle.views) {

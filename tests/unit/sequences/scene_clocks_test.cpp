@@ -511,7 +511,7 @@ TEST(MediaClock, DwellsOnAPicture) {
 
 TEST(SceneClocks, MoveTheMomentAtWhichAStillIsRead) {
     for (const auto& [clock, x] : {std::pair{"cycleInterval 4", 0.0},
-                                   {"cycleInterval 4 startTime -2", 2.0},
+                                   {"cycleInterval 4 startTime -2 stopTime -3", 2.0},
                                    {"cycleInterval 4 startTime -9", -1.0},
                                    {"cycleInterval 4 startTime 1", -1.0}}) {
         SCOPED_TRACE(clock);

@@ -130,7 +130,7 @@ TEST(VideoFrames, DamagedFramesAreReadOnceAndCountedWhereTheyAreAskedFor) {
         if (k < kSound)
             writePng(file, ramp(8, 6, k));
         else
-            writeText(file, "damaged");
+            writeText(file, "\x89PNG\r\n\x1a\n and then nothing");
     }
     Job job;
     {
