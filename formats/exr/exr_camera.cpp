@@ -129,6 +129,7 @@ glm::dvec3 exrOrigin(const ExrReader& reader) {
 
 bool isTrimmed(const ExrPart& part, const Camera& camera) {
     if (part.originX != 0 || part.originY != 0) return true;
+    if (!(camera.fx > 0 && camera.fy > 0)) return false;  // which is said of the camera itself
     constexpr double kRounding = 1e-9;
     const auto* stored = part.attribute<glm::dvec2>("stx:fieldOfView");
     return stored &&

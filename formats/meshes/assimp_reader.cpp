@@ -523,11 +523,6 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         if (format == AssimpFormat::obj) plain = plainCoordinates(bytes, "v");
         if (format == AssimpFormat::stl) plain = plainCoordinates(bytes, "vertex");
         if (plain.text) bytes = *plain.text;
-        if (!plain.unread.empty())
-            files.job().note(fmt::format(
-                "'{}', expected '{} X Y Z': vertices are as Assimp takes them, their "
-                "coordinates rounded to 32-bit floats",
-                plain.unread.substr(0, 60), format == AssimpFormat::obj ? "v" : "vertex"));
         DecoderBounds bounds;
         bounds.memoryBytes = limits.maxMemoryBytes + kSanitizerBytes;
         bounds.cpuSeconds = kMostModelSeconds;
@@ -549,6 +544,11 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         if (!side.missing().empty() && !side.hasMaterialFile())
             files.job().note(
                 fmt::format("material file {}; its materials have no colour", side.missing()));
+        if (!plain.unread.empty())
+            files.job().note(fmt::format(
+                "found '{}', expected '{} X Y Z': vertices are as Assimp takes them, their "
+                "coordinates rounded to 32-bit floats",
+                plain.unread.substr(0, 60), format == AssimpFormat::obj ? "v" : "vertex"));
         noteNotRead(collada, files.job());
         return SceneConverter(scene, format, files, side, plain, std::move(faces.bareMaterials))
             .convert();

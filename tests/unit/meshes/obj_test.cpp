@@ -98,9 +98,10 @@ TEST(Obj, VerticesThatAreNowhereDoNotRoundTheOthers) {
 
 TEST(Obj, VerticesThatAreNotUnderstoodAreSaid) {
     const auto model = mapWith(" v 1 2 ");
-    EXPECT_TRUE(model.hasNote(
-        "'v 1 2', expected 'v X Y Z': vertices are as Assimp takes them, their coordinates rounded "
-        "to 32-bit floats"));
+    EXPECT_TRUE(
+        model.hasNote("found 'v 1 2', expected 'v X Y Z': vertices are as Assimp takes them, their "
+                      "coordinates rounded "
+                      "to 32-bit floats"));
     EXPECT_TRUE(model.hasNote("to which the reader of this format rounds them"));
 }
 
