@@ -42,6 +42,16 @@ class CheckedFrames final : public StillFrames {
 
 }  // namespace
 
+bool isSound(const StillFrames& frames, std::span<const int> which, std::size_t i) {
+    return i == 0 || frames.shownFor(which[i]) != frames.shownFor(which[i - 1]);
+}
+
+int soundFrames(const StillFrames& frames, std::span<const int> which) {
+    int sound = 0;
+    for (std::size_t i = 0; i < which.size(); ++i) sound += isSound(frames, which, i);
+    return sound;
+}
+
 Result<StillBackground> stillBackground(StillFrames& given, const StillSettings& settings,
                                         Job& job) {
     STX_CHECK(checkStillSettings(settings));

@@ -7,16 +7,6 @@
 
 namespace stx {
 
-bool isSound(const StillFrames& frames, std::span<const int> which, std::size_t i) {
-    return i == 0 || frames.shownFor(which[i]) != frames.shownFor(which[i - 1]);
-}
-
-int soundFrames(const StillFrames& frames, std::span<const int> which) {
-    int sound = 0;
-    for (std::size_t i = 0; i < which.size(); ++i) sound += isSound(frames, which, i);
-    return sound;
-}
-
 KeptFrames::KeptFrames(StillFrames& frames, std::uint64_t bytes)
     : frames_(&frames), kept_(static_cast<std::size_t>(frames.count())) {
     const auto size = frames.size();

@@ -29,12 +29,6 @@ class StillFrames {
     [[nodiscard]] virtual int shownFor(int k) const { return k; }
 };
 
-/// Whether frame which[i] counts: it is not the picture of which[i - 1] once more, because it is
-/// damaged. Both have been read.
-[[nodiscard]] bool isSound(const StillFrames& frames, std::span<const int> which, std::size_t i);
-/// How many do.
-[[nodiscard]] int soundFrames(const StillFrames& frames, std::span<const int> which);
-
 /// The same frames; those that are read first are kept, as many as fit into `bytes`. What passes
 /// over all frames several times reads the kept ones once.
 class KeptFrames : public StillFrames {

@@ -19,4 +19,10 @@ inline constexpr std::uint64_t kN2pgBytesPerPixel = 24;
 [[nodiscard]] Result<StillBackground> n2pgBackground(StillFrames& frames,
                                                      std::span<const int> which, Job& job);
 
+/// Whether frame which[i] counts: it is not the picture of which[i - 1] once more, because it is
+/// damaged. Both have been read.
+[[nodiscard]] bool isSound(const StillFrames& frames, std::span<const int> which, std::size_t i);
+/// How many do.
+[[nodiscard]] int soundFrames(const StillFrames& frames, std::span<const int> which);
+
 }  // namespace stx
