@@ -26,9 +26,12 @@ double orthographicRange(const Camera& c, double across) {
 
 }  // namespace
 
-ShareLength::ShareLength(const Camera& camera, double radius)
-    : most_(kMostRadii * radius), orthographic_(camera.orthographic) {
-    if (orthographic_) most_ = std::min(most_, orthographicRange(camera, radius));
+ShareLength::ShareLength(const Camera& camera, double radius) : orthographic_(camera.orthographic) {
+    // Views that are not read tell their bounds a little wider than their points are. Whole powers
+    // of two are the same of both, but for a radius just below one.
+    const double whole = std::exp2(std::ceil(std::log2(radius)));
+    most_ = kMostRadii * whole;
+    if (orthographic_) most_ = std::min(most_, orthographicRange(camera, whole));
 }
 
 PixelSpace::PixelSpace(const Camera& c, double farthest, double across) : camera(c) {
