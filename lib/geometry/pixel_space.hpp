@@ -20,7 +20,7 @@ inline constexpr double kMostRadii = 16.0;
 /// units.
 class ShareLength {
   public:
-    /// `radius`: of the scene.
+    /// `radius`: of the scene; counts as the next power of two.
     ShareLength(const Camera& camera, double radius);
     /// At a distance: that itself, as far as kMostRadii lets it. Of an orthographic camera, whose
     /// picture is the same from any distance, what depths of a PixelSpace are shares of.
