@@ -109,8 +109,8 @@ void setExrOrigin(ExrPart& first, const glm::dvec3& origin);
 /// Whether another program has cut pixels off a view of ours, or put some around it: then what its
 /// header says of them does not hold. `camera`: as exrCamera() gives it.
 [[nodiscard]] bool isTrimmed(const ExrPart& part, const Camera& camera);
-/// The view of a part's data window. Error (invalidInput) when there is no camera, or it makes no
-/// sense, or is not one of so many pixels. Its images are empty.
+/// The view of a part's data window. Errors (invalidInput): the camera is missing, out of range, or
+/// that of a picture of another size. Its images are empty.
 [[nodiscard]] Result<ReferenceView> exrCamera(const ExrPart& part);
 
 }  // namespace stx

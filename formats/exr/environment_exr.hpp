@@ -46,9 +46,9 @@ struct ExrEnvironmentHeader {
 [[nodiscard]] Result<std::shared_ptr<const Environment>> readEnvironmentPart(
     const ExrReader& reader, int part, Job& job);
 
-/// Other programs' pictures of light may have holes in it, and suns that overflowed: of the
-/// channels R, G, B, Y and A what is infinite becomes 65504 (alpha: 1), what is no number 0. Notes
-/// say how many. `values` are interleaved.
+/// Replaces what other programs leave in pictures of light: in the channels R, G, B, Y and A
+/// infinity becomes 65504 (alpha: 1), NaN and negative infinity become 0. Notes say how many.
+/// `values` are interleaved.
 void makeFinite(std::span<float> values, std::span<const std::string> channels,
                 const std::string& where, Job& job);
 

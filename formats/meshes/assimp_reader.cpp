@@ -63,8 +63,9 @@ class SceneConverter {
     }
 
     Result<Mesh> convert() {
-        if (std::ranges::any_of(scene_.meshes, [](const auto& mesh) { return !mesh.uvs.empty(); }))
-            place_ = files_.placeOfColour(builder_.textures());
+        place_ = files_.placeOfColour(
+            builder_.textures(),
+            std::ranges::any_of(scene_.meshes, [](const auto& mesh) { return !mesh.uvs.empty(); }));
         for (const auto& material : scene_.materials) STX_CHECK(convertMaterial(material));
         if (saysUndefined_ && place_ < 0) noteUndefined();
         if (builder_.materials().empty()) {

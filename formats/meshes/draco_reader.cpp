@@ -57,7 +57,7 @@ Result<Mesh> readDraco(ByteSpan bytes, ModelFiles& files) {
         files.job().note(fmt::format("dropped: {} attributes of the Draco stream", dropped));
     if (part.positions.empty() && count > 0)
         return fail(ErrorCode::invalidInput, "the Draco stream has no positions");
-    const int place = part.uvs.empty() ? -1 : files.placeOfColour(builder.textures());
+    const int place = files.placeOfColour(builder.textures(), !part.uvs.empty());
     builder.materials().push_back(
         {.name = "default", .baseColourTexture = place, .hasColour = false});
     STX_CHECK(builder.add(std::move(part)));

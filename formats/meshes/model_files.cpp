@@ -54,8 +54,8 @@ std::string_view ModelFiles::whyNotThere(std::string_view name, const Error& err
     return "is outside of the model's folder (--allow-outside reads what is there) and not in it";
 }
 
-int ModelFiles::placeOfColour(std::vector<MeshTexture>& textures) const {
-    if (!replacesColour_) return -1;
+int ModelFiles::placeOfColour(std::vector<MeshTexture>& textures, bool hasUvs) const {
+    if (!replacesColour_ || !hasUvs) return -1;
     textures.push_back({Rgba8Image(1, 1)});
     return static_cast<int>(textures.size()) - 1;
 }

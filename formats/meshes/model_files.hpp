@@ -50,8 +50,9 @@ class ModelFiles {
     /// get another picture, and no others do.
     [[nodiscard]] bool replacesColour() const { return replacesColour_; }
 
-    /// A new texture of one pixel for that; -1 where nothing is replaced.
-    [[nodiscard]] int placeOfColour(std::vector<MeshTexture>& textures) const;
+    /// A new texture of one pixel for that; -1 where nothing is replaced, or nothing has texture
+    /// coordinates.
+    [[nodiscard]] int placeOfColour(std::vector<MeshTexture>& textures, bool hasUvs) const;
 
     /// Metallic-roughness is asked for.
     [[nodiscard]] bool materials() const { return materials_; }

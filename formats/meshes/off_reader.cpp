@@ -37,7 +37,7 @@ class OffReader {
                 fmt::format("dropped: numbers behind the coordinates of vertices ({}); where "
                             "they are colours the first line says COFF",
                             unsaid_));
-        const int place = part_.uvs.empty() ? -1 : files_.placeOfColour(builder_.textures());
+        const int place = files_.placeOfColour(builder_.textures(), !part_.uvs.empty());
         builder_.materials().push_back(
             {.name = "default", .baseColourTexture = place, .hasColour = false});
         part_.where = "OFF";

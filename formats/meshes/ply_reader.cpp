@@ -143,7 +143,8 @@ class PlyReader {
         return v;
     }
 
-    /// What is cut off at the end of a line is no element whose lists are empty.
+    /// Begins an element. A file that ends after a whole line is cut off, too: its missing elements
+    /// are not elements with empty lists.
     Result<void> begin(const PlyElement& element, std::uint64_t i) {
         if (values_.beginElement()) return {};
         return fail(ErrorCode::invalidInput, "{} {} of {}: the file ends; it is cut off",
@@ -339,7 +340,7 @@ class PlyReader {
         if (!header_.textureFiles.empty() && !hasUvs)
             files_.job().note("the PLY file names a texture but has no texture coordinates for it");
         auto& materials = builder_.materials();
-        const int place = hasUvs ? files_.placeOfColour(builder_.textures()) : -1;
+        const int place = files_.placeOfColour(builder_.textures(), hasUvs);
         for (const auto& name : header_.textureFiles) {
             Material m{.name = name, .baseColourTexture = place, .hasColour = false};
             if (hasUvs && !files_.replacesColour())

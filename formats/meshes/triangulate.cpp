@@ -147,7 +147,7 @@ void triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& t
     std::iota(all.begin(), all.end(), 0u);
     if (n == 3) return fan(all, triangles);
     const auto flat = flatten(corners);
-    // A corner that is there twice does not look like one of a notch, and is no ear.
+    // A corner that is there twice has no angle: a notch at it would be filled, and no ear is cut.
     std::vector<glm::dvec2> places;
     for (const auto i : all) {
         if (corners[i] == corners[(i + 1) % n]) continue;

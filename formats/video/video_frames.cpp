@@ -156,7 +156,7 @@ class SteadyFrames final : public VideoFrames {
         const auto first = std::ranges::find_if(damaged_, wanted);
         if (first == damaged_.end()) return;
         job_.note(
-            fmt::format("{} of {} cannot be used, and the frame before stands for each; stx "
+            fmt::format("{} of {} cannot be used, and the frame before takes its place; stx "
                         "background --strict stops there; the first: {}",
                         std::ranges::count_if(damaged_, wanted), counted(count(), "frame"),
                         first->second.error.text()));
@@ -193,7 +193,7 @@ class SteadyFrames final : public VideoFrames {
   private:
     struct Damage {
         Error error;
-        int shown;            ///< the frame that stands for it; itself where none can
+        int shown;            ///< the frame that takes its place; itself where there is none
         bool wanted = false;  ///< and not only found on the way to another
     };
 
@@ -206,8 +206,8 @@ class SteadyFrames final : public VideoFrames {
         return known->second.shown;
     }
 
-    /// What stands for a frame that is damaged: the nearest one before it that is not, or else the
-    /// first one after. Remembers it for all that it passes, so that each is read once.
+    /// The frame that takes the place of a damaged one: the nearest sound one before it, or else
+    /// the first one after. Remembers it for all that it passes, so that each is read once.
     int findFor(int k, const Error& error) {
         const std::lock_guard lock(mutex_);
         if (const auto known = damaged_.find(k); known != damaged_.end()) {

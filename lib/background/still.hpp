@@ -41,7 +41,7 @@ struct StillBackground {
     /// share of them within kStillAgrees levels in the worst channel; n2pg: the share of all frames
     /// that the pixel has been steady for since it was last replaced.
     Image<std::uint8_t> confidence;
-    /// Frames that were looked at, without the damaged ones that another one stands for.
+    /// Frames that were looked at, without the damaged ones, in whose place another is shown.
     int framesUsed = 0;
 };
 

@@ -27,8 +27,8 @@ double orthographicRange(const Camera& c, double across) {
 }  // namespace
 
 ShareLength::ShareLength(const Camera& camera, double radius) : orthographic_(camera.orthographic) {
-    // Views that are not read tell their bounds a little wider than their points are. Whole powers
-    // of two are the same of both, but for a radius just below one.
+    // Summaries of views that are not read have bounds a little wider than their points. A radius
+    // that is rounded up to a power of two is the same for both, unless it is just below one.
     const double whole = std::exp2(std::ceil(std::log2(radius)));
     most_ = kMostRadii * whole;
     if (orthographic_) most_ = std::min(most_, orthographicRange(camera, whole));

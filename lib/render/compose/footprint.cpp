@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -31,7 +32,6 @@ class FootprintRenderer final : public Renderer {
         : inner_(std::move(inner)),
           set_(set),
           footprint_(set),
-          radius_(set.bounds().radius()),
           lit_(settings.lighting.on()),
           log_(settings.log),
           job_(job) {}
@@ -44,7 +44,8 @@ class FootprintRenderer final : public Renderer {
         if (!large_) return inner_->render(camera);
         STX_TRY(Frame large, inner_->render(enlarged(camera, factor)));
         StageTimer timer(log_.get(), "footprint");
-        Frame out = minified(large, factor, ShareLength(camera, radius_));
+        if (!radius_) radius_ = set_.bounds().radius();
+        Frame out = minified(large, factor, ShareLength(camera, *radius_));
         timer.changed(static_cast<std::int64_t>(out.depth.count()));
         inner_->reuse(std::move(large));
         return out;
@@ -93,7 +94,7 @@ class FootprintRenderer final : public Renderer {
     std::unique_ptr<Renderer> inner_;
     PageSet set_;
     Footprint footprint_;
-    double radius_;
+    std::optional<double> radius_;  ///< of the scene, once it was needed
     bool lit_;
     std::shared_ptr<StageLog> log_;
     Job& job_;

@@ -37,8 +37,8 @@ bool samePicture(const PageSet& set, std::size_t a, std::size_t b) {
                                 std::min(c.width, c.height));
     const auto compared = [step](int size) { return (size - 1 - step / 2) / step + 1; };
     const double mayDiffer = kMayDiffer * compared(c.width) * compared(c.height);
-    // Of many views from one place each is held against all others: those that are not the same
-    // tell it soon.
+    // Of many views from one place each is compared with all others: those that differ are left
+    // after a few pixels.
     int different = 0;
     for (int y = step / 2; y < c.height; y += step)
         for (int x = step / 2; x < c.width; x += step)

@@ -33,7 +33,7 @@ class DrawnFrames : public StillFrames {
 
     std::atomic<int> reads = 0;
     std::vector<int> broken;
-    std::map<int, int> shown;  ///< of damaged frames: which stands for each
+    std::map<int, int> shown;  ///< of damaged frames: which takes its place
 
   private:
     glm::ivec2 size_;

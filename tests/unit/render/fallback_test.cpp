@@ -23,7 +23,7 @@ class Failing final : public Renderer {
 
 class Steady final : public Renderer {
   public:
-    /// Its time is where lights stand of the camera.
+    /// Its time says from which camera it was lit.
     Result<Frame> render(const Camera& camera) override {
         Frame frame;
         frame.milliseconds = lightPose(camera).position.x;

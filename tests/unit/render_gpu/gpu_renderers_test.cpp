@@ -309,8 +309,8 @@ TEST_P(GpuRenderers, FramesExpectedAreTheSame) {
     const Bundle bundle = analyticBundle(AnalyticScene::object, 4, 2);
     Job job;
     auto plain = makeRenderer(Backend::gpu, bundle, settings(), -1, job);
-    auto told = makeRenderer(Backend::gpu, bundle, settings(), -1, job);
-    ASSERT_TRUE(plain && told);
+    auto expecting = makeRenderer(Backend::gpu, bundle, settings(), -1, job);
+    ASSERT_TRUE(plain && expecting);
     std::vector<Camera> cameras;
     for (const double at : {0.2, 0.4, 1.0, 1.3, 2.6, 2.8})
         cameras.push_back(analyticCamera(AnalyticScene::object, at, 4));
@@ -319,22 +319,22 @@ TEST_P(GpuRenderers, FramesExpectedAreTheSame) {
     for (std::size_t i = 0; i < cameras.size(); ++i) {
         // Right, wrong (one is skipped), and one that makes no sense.
         if (i == 3) {
-            (*told)->expect(cameras[5]);
+            (*expecting)->expect(cameras[5]);
         } else if (i == 4) {
             Camera none = cameras[5];
             none.width = 0;
-            (*told)->expect(none);
+            (*expecting)->expect(none);
         } else if (i + 1 < cameras.size()) {
-            (*told)->expect(cameras[i + 1]);
+            (*expecting)->expect(cameras[i + 1]);
         }
-        const auto a = (*plain)->render(cameras[i]), b = (*told)->render(cameras[i]);
+        const auto a = (*plain)->render(cameras[i]), b = (*expecting)->render(cameras[i]);
         ASSERT_TRUE(a && b) << i;
         EXPECT_GT(psnr(a->colour, b->colour), 90.0) << i;
         EXPECT_EQ(a->depth, b->depth) << i;
     }
     // And a frame begun that nobody asks for.
-    (*told)->expect(cameras[0]);
-    EXPECT_TRUE((*told)->render(cameras[1]));
+    (*expecting)->expect(cameras[0]);
+    EXPECT_TRUE((*expecting)->render(cameras[1]));
 }
 
 TEST_P(GpuRenderers, FramesExpectedHaveTheLightsThatAreAskedFor) {
@@ -343,21 +343,21 @@ TEST_P(GpuRenderers, FramesExpectedHaveTheLightsThatAreAskedFor) {
     s.lighting.lights = {{Light::Kind::directional, {0, 0, -1}, glm::vec3(1), true}};
     Job job;
     auto plain = makeRenderer(Backend::gpu, bundle, s, -1, job);
-    auto told = makeRenderer(Backend::gpu, bundle, s, -1, job);
-    ASSERT_TRUE(plain && told);
+    auto expecting = makeRenderer(Backend::gpu, bundle, s, -1, job);
+    ASSERT_TRUE(plain && expecting);
     const Camera first = analyticCamera(AnalyticScene::object, 0.2, 4),
                  second = analyticCamera(AnalyticScene::object, 0.4, 4),
                  pose = analyticCamera(AnalyticScene::object, 1.4, 4);
-    (*told)->expect(second);
-    ASSERT_TRUE((*told)->render(first));
+    (*expecting)->expect(second);
+    ASSERT_TRUE((*expecting)->render(first));
     const auto own = (*plain)->render(second);
-    for (auto* renderer : {&plain, &told}) (**renderer)->lightFrom(pose);
-    const auto a = (*plain)->render(second), b = (*told)->render(second);
+    for (auto* renderer : {&plain, &expecting}) (**renderer)->lightFrom(pose);
+    const auto a = (*plain)->render(second), b = (*expecting)->render(second);
     ASSERT_TRUE(own && a && b);
     EXPECT_GT(psnr(a->colour, b->colour), 90.0);
     EXPECT_LT(psnr(a->colour, own->colour), 30.0);
-    (*told)->lightFrom(std::nullopt);
-    const auto again = (*told)->render(second);
+    (*expecting)->lightFrom(std::nullopt);
+    const auto again = (*expecting)->render(second);
     ASSERT_TRUE(again);
     EXPECT_GT(psnr(again->colour, own->colour), 90.0);
 }

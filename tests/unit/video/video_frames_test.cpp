@@ -117,7 +117,7 @@ TEST(VideoFrames, TheFrameBeforeADamagedOneStandsForIt) {
     }
     const auto notes = job.takeNotes();
     ASSERT_EQ(notes.size(), 1u);
-    EXPECT_TRUE(has(notes[0], "2 of 5 frames cannot be used, and the frame before stands for each"))
+    EXPECT_TRUE(has(notes[0], "2 of 5 frames cannot be used, and the frame before takes its place"))
         << notes[0];
     EXPECT_FALSE(openVideoFrames({folder.path()}, job, true));
 }
