@@ -5,6 +5,7 @@
 
 #include "formats/mpeg4/mapping/point_texture.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
+#include "formats/mpeg4/mapping/view_images.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
 #include "lib/geometry/directions.hpp"
 
