@@ -11,9 +11,10 @@
 namespace stx::tools {
 
 /// Reads views to be drawn, those of `wanted`: into memory, or where they and `drawing`
-/// (drawingMemory()) take more than the limit into `spool`, which is made in `folder` then and must
-/// outlive the bundle. `look`: as that of someViews(). Errors: those of the views; (invalidInput)
-/// even from a spool it is more than the limit; (io) no file can be made.
+/// (drawingMemory()) take much (DrawingMemory::inSpool()) into `spool`, which is made in `folder`
+/// then and must outlive the bundle. What the limit allows is in memory, too, where such a file
+/// would cost much. `look`: as that of someViews(). Errors: those of the views; (invalidInput) even
+/// from a spool it is more than the limit; (io) no file can be made.
 [[nodiscard]] Result<Bundle> viewsToDraw(
     const ViewTable& table, const PeakMemory& drawing, const std::vector<bool>& wanted,
     const std::filesystem::path& folder, std::unique_ptr<FileSpool>& spool, Job& job,

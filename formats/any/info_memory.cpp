@@ -1,6 +1,7 @@
 #include "formats/any/info_memory.hpp"
 
 #include <algorithm>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -9,6 +10,7 @@
 #include "lib/packing/views_one_by_one.hpp"
 #include "lib/quality/prune_quality.hpp"
 #include "lib/refine/refine_needed.hpp"
+#include "lib/render/drawing_memory.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
 #include "lib/sheet/sheet.hpp"
 #include "lib/splats/from_bundle.hpp"
@@ -31,7 +33,7 @@ struct ViewCommand {
         atSurfaces,  ///< at all, where the limit allows it; else at one at a time, from a spool
         atDiscs,     ///< the same
         atGroups,    ///< at all, where the limit allows it; else at as many as it has room for
-        atAll,
+        whileDrawn,  ///< at all; from a spool where they take more than a picture needs of them
     } looks;
 };
 
@@ -44,10 +46,10 @@ constexpr ViewCommand kCommands[] = {
     {"bake -o NAME.mp4", &peak::kBakeToMpeg4, &peak::kBakeToMpeg4, atEach},
     {"extract -o FOLDER", &peak::kExport, &peak::kExport, atRefined},
     {"sheet", &peak::kSheet, &peak::kSheet, onSheet},
-    {"render", &peak::kSurfaceMode, &peak::kSurfaceMode, atAll},
-    {"render --mode splat", &peak::kSplatMode, &peak::kSplatMode, atAll},
-    {"render --light", &peak::kLitSurfaceMode, &peak::kLitSurfaceMode, atAll},
-    {"render --mode splat --light", &peak::kLitSplatMode, &peak::kLitSplatMode, atAll},
+    {"render", &peak::kSurfaceMode, &peak::kSurfaceMode, whileDrawn},
+    {"render --mode splat", &peak::kSplatMode, &peak::kSplatMode, whileDrawn},
+    {"render --light", &peak::kLitSurfaceMode, &peak::kLitSurfaceMode, whileDrawn},
+    {"render --mode splat --light", &peak::kLitSplatMode, &peak::kLitSplatMode, whileDrawn},
     {"pack", &peak::kAtlas, &peak::kAtlas, whilePacked},
     {"pack --min-psnr", &peak::kAtlas, &peak::kAtlas, whilePruned},
     {"select", &peak::kSelect, &peak::kSelect, atEach},
@@ -101,10 +103,10 @@ class MemoryOfCommands {
                 return withRefining(spooled(takes, memoryOfSpooledSplats(table_, limits_)));
             case atGroups:
                 return withRefining(grouped(takes));
-            case atAll:
-                break;
+            case whileDrawn:
+                return withRefining(drawn(takes));
         }
-        return {std::max(memoryOfAll(table_, takes), refines_ ? refiningAll_ : 0), true};
+        return {};
     }
 
   private:
@@ -141,6 +143,11 @@ class MemoryOfCommands {
             most = std::max(most, table_.bytesOf(i) + takes.perPixel * table_.pixelsOf(i));
         return {most, false};
     }
+    [[nodiscard]] Takes drawn(const PeakMemory& takes) const {
+        if (!onDemand_) return each(takes, false);
+        const DrawingMemory views(table_, takes, std::vector<bool>(table_.count(), true));
+        return {views.most(limits_), !views.inSpool(limits_)};
+    }
     [[nodiscard]] Takes spooled(const PeakMemory& takes, std::uint64_t inSpool) const {
         const std::uint64_t all = memoryOfAll(table_, takes);
         const bool one =
@@ -166,9 +173,10 @@ nlohmann::ordered_json memoryOf(const ViewTable& table, std::size_t frames, bool
         const auto takes = memory.of(command, vectors ? *command.takesWithVectors : *command.takes);
         commands.push_back({{"command", command.words},
                             {"bytes", takes.bytes + kept},
-                            {"views", takes.all                   ? "all"
-                                      : command.looks == atGroups ? "as many as fit"
-                                                                  : "one for each thread"}});
+                            {"views", takes.all ? "all"
+                                      : command.looks == atGroups || command.looks == whileDrawn
+                                          ? "as many as fit"
+                                          : "one for each thread"}});
     }
     return {{"threads", threadCount()}, {"commands", std::move(commands)}};
 }

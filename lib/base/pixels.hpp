@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <new>
 #include <span>
@@ -18,6 +19,11 @@ class PixelSpool {
     virtual ~PixelSpool() = default;
     /// Room for so many bytes, aligned for all values. Errors: std::bad_alloc, std::system_error.
     [[nodiscard]] virtual void* take(std::size_t bytes) = 0;
+    /// Room for so many bytes that holds those of `data`. A spool may have a shorter way to it than
+    /// through memory.
+    [[nodiscard]] virtual void* keep(const void* data, std::size_t bytes) {
+        return std::memcpy(take(bytes), data, bytes);
+    }
     virtual void give(void* room, std::size_t bytes) noexcept = 0;
     /// Gives memory back now, if much is in use. For who goes over many pixels.
     virtual void settle() noexcept = 0;
@@ -31,12 +37,22 @@ class Pixels {
   public:
     Pixels() = default;
     explicit Pixels(std::size_t count, T fill = {}, PixelSpool* spool = nullptr)
-        : Pixels(Room{}, count, spool) {
+        : count_(count), spool_(spool) {
+        if (count == 0) return;
+        if (count > PTRDIFF_MAX / sizeof(T)) throw std::bad_array_new_length();
+        first_ = spool ? static_cast<T*>(spool->take(count * sizeof(T)))
+                       : std::allocator<T>().allocate(count);
         std::uninitialized_fill_n(first_, count, fill);
     }
     Pixels(const Pixels& other) : Pixels(other, nullptr) {}
-    Pixels(const Pixels& other, PixelSpool* spool) : Pixels(Room{}, other.count_, spool) {
-        std::uninitialized_copy_n(other.first_, count_, first_);
+    Pixels(const Pixels& other, PixelSpool* spool) : count_(other.count_), spool_(spool) {
+        if (count_ == 0) return;
+        if (spool) {
+            first_ = static_cast<T*>(spool->keep(other.first_, count_ * sizeof(T)));
+        } else {
+            first_ = std::allocator<T>().allocate(count_);
+            std::uninitialized_copy_n(other.first_, count_, first_);
+        }
     }
     Pixels(Pixels&& other) noexcept { swap(other); }
     Pixels& operator=(const Pixels& other) {
@@ -67,13 +83,6 @@ class Pixels {
     }
 
   private:
-    struct Room {};
-    Pixels(Room, std::size_t count, PixelSpool* spool) : count_(count), spool_(spool) {
-        if (count == 0) return;
-        if (count > PTRDIFF_MAX / sizeof(T)) throw std::bad_array_new_length();
-        first_ = spool ? static_cast<T*>(spool->take(count * sizeof(T)))
-                       : std::allocator<T>().allocate(count);
-    }
     void swap(Pixels& other) noexcept {
         std::swap(first_, other.first_);
         std::swap(count_, other.count_);

@@ -198,10 +198,37 @@ def film_of_many(args, folder):
     return wrong
 
 
+# Views of 1024² of which a picture would take 540 MiB by splats and 750 by surfaces, and what it takes of them with the limit that nobody sets, MiB.
+PICTURE_VIEWS, PICTURE_TAKES = 34, 360
+
+
+def picture_of_many(args, folder):
+    """A picture of many views takes what it needs, or is not the same as from memory."""
+    wrong = []
+    modes = [mode for mode in ("surface", "splat") if args.only in f"picture of many {mode}"]
+    if not modes or not os.path.exists(args.model):
+        return wrong
+    must([args.stx, "convert", os.path.abspath(args.model), "-o", "picture.exr", "--views", f"sphere:{PICTURE_VIEWS}", "--size", "1024x1024"], folder)
+    for mode in modes:
+        made, takes = [], []
+        for limit in ([], ["--max-memory", str(IN_MEMORY)]):
+            done = must([args.stx, "render", "picture.exr", "-o", "picture.png", "--orbit", "1", "--size", "512x512", "--mode", mode, "--backend", "cpu", "--threads", "2"] + limit,
+                        folder)
+            made.append(files_of(os.path.join(folder, "picture.png")))
+            takes.append(done.usage.ru_maxrss / 1024)
+        if args.measure:
+            print(f"picture of many {mode:8} {takes[0]:6.1f} MiB, {takes[1]:6.1f} in memory", flush=True)
+        elif takes[0] > PICTURE_TAKES + PROGRAM:
+            wrong.append(f"picture of many {mode}: {takes[0]:.1f} MiB")
+        if made[0] != made[1]:
+            wrong.append(f"picture of many {mode}: it is not that of a larger --max-memory")
+    return wrong
+
+
 def main():
     args = harness.arguments(__doc__, measure=0, only="")
     with tempfile.TemporaryDirectory(prefix="stx-peak-") as folder:
-        end(many_views(args, folder) + noisy_of_many(args, folder) + film_of_many(args, folder))
+        end(many_views(args, folder) + noisy_of_many(args, folder) + film_of_many(args, folder) + picture_of_many(args, folder))
 
 
 if __name__ == "__main__":

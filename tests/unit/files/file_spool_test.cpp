@@ -45,6 +45,14 @@ TEST(FileSpool, PixelsStayWhatTheyAre) {
     EXPECT_EQ(image.at(3, 1), 1.0f + 3.0f * static_cast<float>(1003 % 7));
 }
 
+TEST(FileSpool, CostsLittleOnADiskWithRoom) {
+    const TemporaryFolder folder;
+    EXPECT_FALSE(FileSpool::costsLittle(folder.path(), std::uint64_t{1} << 60));
+    EXPECT_FALSE(FileSpool::costsLittle(folder / "not there", 1));
+    if (std::filesystem::exists("/dev/shm"))
+        EXPECT_FALSE(FileSpool::costsLittle("/dev/shm", 1)) << "it is in memory";
+}
+
 TEST(FileSpool, ServesManyThreads) {
     const TemporaryFolder folder;
     const auto spool = smallSpool(folder);

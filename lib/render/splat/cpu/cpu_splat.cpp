@@ -27,6 +27,8 @@ constexpr int kTile = 16;
 constexpr int kRegionWidth = 256, kRegionRows = 128;
 // Blocks are drawn column by column of the picture; pixels.
 constexpr int kColumn = 64;
+// Pixels of a spool are given back, if they are many, behind so many blocks: some megabytes of it.
+constexpr std::size_t kSettled = 32;
 
 // One thread's buffers for a region.
 struct Scratch {
@@ -218,10 +220,7 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     }
     {
         const StageTimer timer(settings_.log.get(), "draw");
-        parallelFor(0, regions, [&](int n) {
-            drawRegion(picture, n);
-            set_.settle();
-        });
+        parallelFor(0, regions, [&](int n) { drawRegion(picture, n); });
     }
     if (settings_.splat == SplatRule::data) {
         const auto& colour = picture.frame.colour;
@@ -308,6 +307,7 @@ void CpuSplatRenderer::drawRegion(Picture& picture, int index) {
         region.normals = scratch.normals.data();
     }
     const auto after = [&](std::size_t k) {
+        if (k % kSettled == 0) set_.settle();
         if (k + 1 >= bin.size()) return Ahead{};
         const BlockTask& next = tasks_[bin[k + 1]];
         return Ahead{&sources_[next.source], &next};
