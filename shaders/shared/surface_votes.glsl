@@ -68,6 +68,28 @@ bool isBackground(int s, ivec2 corner, float level) {
     return !(level > 0.0f) || !(largestLevelAround(s, corner) < kSolidAlpha);
 }
 
+// Where a surface has a crease between the middle two of four pixels in line, `t` (0..1) from one to the other: there
+// the surfaces of both sides go on until they meet. 0 where they do not tell, or within `limit` are not linked.
+float creaseBetween(float a, float b, float c, float d, float t, float limit) {
+    bool linked = min(min(a, b), min(c, d)) > 0.0f && abs(b - a) < limit && abs(c - d) < limit;
+    return linked ? min(b + (b - a) * t, c + (c - d) * (1.0f - t)) : 0.0f;
+}
+
+// How near a source's surface may come at `t` between the middles of the 2x2 pixels from `corner` on, where it may
+// have a crease that none of them shows.
+float creaseAmong(int s, ivec2 corner, vec2 t, float limit) {
+    Taps place = tapPlaceOf(s, corner - 1);
+    float q[16];
+    for (int k = 0; k < 16; ++k)
+        q[k] = canRead(place, corner - 1 + ivec2(k % 4, k / 4)) ? qAt(s, place, k % 4, k / 4) : 0.0f;
+    float along[4];
+    for (int k = 0; k < 2; ++k) {
+        along[k] = creaseBetween(q[4 * k + 4], q[4 * k + 5], q[4 * k + 6], q[4 * k + 7], t.x, limit);
+        along[k + 2] = creaseBetween(q[k + 1], q[k + 5], q[k + 9], q[k + 13], t.y, limit);
+    }
+    return max(min(along[0], along[1]), min(along[2], along[3]));
+}
+
 // The vote of a source on the point `at` in its image, at depth p, where it does not see background.
 int voteOnDepth(int s, Place place, ivec2 corner, vec2 at, float p) {
     ivec2 size = sizeOf(s);
@@ -98,7 +120,10 @@ int voteOnDepth(int s, Place place, ivec2 corner, vec2 at, float p) {
         }
     }
     if (!(most > 0.0f)) return kNoVote;
-    bool linked = !(most - least > kLinkedSamples * coarseOf(s) * relativeScale(axisOf(s), most));
+    float limit = kLinkedSamples * coarseOf(s) * relativeScale(axisOf(s), most);
+    bool linked = !(most - least > limit);
+    if (linked && !gaps && p < creaseAmong(s, corner, at - 0.5f - vec2(float(corner.x), float(corner.y)), limit) + margin)
+        return kNoVote;
     return linked && !gaps && !doubtful ? kWholeVote : kHalfVote;
 }
 
