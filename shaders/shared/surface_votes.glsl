@@ -161,6 +161,7 @@ struct Facet {
     float off;      // how far in front of it noise may put a point of it
     float edgeOn;   // seen this small or smaller, as a share of its own pixel, it is seen edge on
     float behind;   // and so far behind it background must be, pixels of who sees it edge on
+    float grazing;  // seen this small or smaller it is seen at a grazing angle; at least `edgeOn`
 };
 
 // The one that a source shows at the point (x, y, q) of the frame. `measured`: between the middles of its
@@ -199,7 +200,10 @@ Facet facetOf(int s, float x, float y, float q, bool measured) {
     // Noise tilts facets, and puts points in front of them.
     facet.off = kBehindNoises * (clearlyBehindOf(s) - kClearlyBehind) * relativeScale(axisOf(s), p);
     float slope = length(g) / (facet.perUnit * texel);
-    facet.edgeOn = kEdgeOn * (measured ? sqrt(1.0f + slope * slope) : 1.0f) + facet.off / (facet.perUnit * texel);
+    float least = kEdgeOn * (measured ? sqrt(1.0f + slope * slope) : 1.0f);
+    float tilt = facet.off / (facet.perUnit * texel);
+    facet.edgeOn = least + tilt;
+    facet.grazing = least * (measured ? coarseOf(s) : 1.0f) + tilt;
     facet.behind = measured ? kBehindMeasured : kBehindTexel;
     return facet;
 }
@@ -224,10 +228,12 @@ bool beyondCentres(int s, float x, float y, float q) {
 }
 
 // A source whose vote on a point is of an outline, beside what it sees edge on, where all is outline, and where
-// that is its pixels tell to a part of one only: it must see past what is so far behind the point, too.
-bool seesEdgeOn(int s, IN(Facet) facet, vec4 h) { return facet.any && sizeIn(s, facet, h) < facet.edgeOn; }
+// that is its pixels tell to a part of one only: it must see past what is so far behind the point, too. Of coarse
+// views the same is so of what is seen at a grazing angle, to a smaller part.
+bool seesEdgeOn(int s, IN(Facet) facet, vec4 h) { return facet.any && sizeIn(s, facet, h) < facet.grazing; }
 vec4 behindFacet(int s, IN(Facet) facet, vec4 h) {
-    float behind = facet.behind * texelAt(s, h.z / h.w) * facet.perUnit + facet.off;
+    float pixels = sizeIn(s, facet, h) < facet.edgeOn ? facet.behind : kBehindGrazing;
+    float behind = pixels * texelAt(s, h.z / h.w) * facet.perUnit + facet.off;
     return h - warpChange(s, facet.into) * behind;
 }
 
