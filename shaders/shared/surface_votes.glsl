@@ -68,6 +68,28 @@ bool isBackground(int s, ivec2 corner, float level) {
     return !(level > 0.0f) || !(largestLevelAround(s, corner) < kSolidAlpha);
 }
 
+// Where a surface has a crease between the middle two of four pixels in line, `t` (0..1) from one to the other: there
+// the surfaces of both sides go on until they meet. 0 where they do not tell, or within `limit` are not linked.
+float creaseBetween(float a, float b, float c, float d, float t, float limit) {
+    bool linked = min(min(a, b), min(c, d)) > 0.0f && abs(b - a) < limit && abs(c - d) < limit;
+    return linked ? min(b + (b - a) * t, c + (c - d) * (1.0f - t)) : 0.0f;
+}
+
+// How near a source's surface may come at `t` between the middles of the 2x2 pixels from `corner` on, where it may
+// have a crease that none of them shows.
+float creaseAmong(int s, ivec2 corner, vec2 t, float limit) {
+    Taps place = tapPlaceOf(s, corner - 1);
+    float q[16];
+    for (int k = 0; k < 16; ++k)
+        q[k] = canRead(place, corner - 1 + ivec2(k % 4, k / 4)) ? qAt(s, place, k % 4, k / 4) : 0.0f;
+    float along[4];
+    for (int k = 0; k < 2; ++k) {
+        along[k] = creaseBetween(q[4 * k + 4], q[4 * k + 5], q[4 * k + 6], q[4 * k + 7], t.x, limit);
+        along[k + 2] = creaseBetween(q[k + 1], q[k + 5], q[k + 9], q[k + 13], t.y, limit);
+    }
+    return max(min(along[0], along[1]), min(along[2], along[3]));
+}
+
 // The vote of a source on the point `at` in its image, at depth p, where it does not see background.
 int voteOnDepth(int s, Place place, ivec2 corner, vec2 at, float p) {
     ivec2 size = sizeOf(s);
@@ -98,7 +120,10 @@ int voteOnDepth(int s, Place place, ivec2 corner, vec2 at, float p) {
         }
     }
     if (!(most > 0.0f)) return kNoVote;
-    bool linked = !(most - least > kLinkedSamples * coarseOf(s) * relativeScale(axisOf(s), most));
+    float limit = kLinkedSamples * coarseOf(s) * relativeScale(axisOf(s), most);
+    bool linked = !(most - least > limit);
+    if (linked && !gaps && p < creaseAmong(s, corner, at - 0.5f - vec2(float(corner.x), float(corner.y)), limit) + margin)
+        return kNoVote;
     return linked && !gaps && !doubtful ? kWholeVote : kHalfVote;
 }
 
@@ -136,6 +161,7 @@ struct Facet {
     float off;      // how far in front of it noise may put a point of it
     float edgeOn;   // seen this small or smaller, as a share of its own pixel, it is seen edge on
     float behind;   // and so far behind it background must be, pixels of who sees it edge on
+    float grazing;  // seen this small or smaller it is seen at a grazing angle; at least `edgeOn`
 };
 
 // The one that a source shows at the point (x, y, q) of the frame. `measured`: between the middles of its
@@ -174,7 +200,10 @@ Facet facetOf(int s, float x, float y, float q, bool measured) {
     // Noise tilts facets, and puts points in front of them.
     facet.off = kBehindNoises * (clearlyBehindOf(s) - kClearlyBehind) * relativeScale(axisOf(s), p);
     float slope = length(g) / (facet.perUnit * texel);
-    facet.edgeOn = kEdgeOn * (measured ? sqrt(1.0f + slope * slope) : 1.0f) + facet.off / (facet.perUnit * texel);
+    float least = kEdgeOn * (measured ? sqrt(1.0f + slope * slope) : 1.0f);
+    float tilt = facet.off / (facet.perUnit * texel);
+    facet.edgeOn = least + tilt;
+    facet.grazing = least * (measured ? coarseOf(s) : 1.0f) + tilt;
     facet.behind = measured ? kBehindMeasured : kBehindTexel;
     return facet;
 }
@@ -199,10 +228,12 @@ bool beyondCentres(int s, float x, float y, float q) {
 }
 
 // A source whose vote on a point is of an outline, beside what it sees edge on, where all is outline, and where
-// that is its pixels tell to a part of one only: it must see past what is so far behind the point, too.
-bool seesEdgeOn(int s, IN(Facet) facet, vec4 h) { return facet.any && sizeIn(s, facet, h) < facet.edgeOn; }
+// that is its pixels tell to a part of one only: it must see past what is so far behind the point, too. Of coarse
+// views the same is so of what is seen at a grazing angle, to a smaller part.
+bool seesEdgeOn(int s, IN(Facet) facet, vec4 h) { return facet.any && sizeIn(s, facet, h) < facet.grazing; }
 vec4 behindFacet(int s, IN(Facet) facet, vec4 h) {
-    float behind = facet.behind * texelAt(s, h.z / h.w) * facet.perUnit + facet.off;
+    float pixels = sizeIn(s, facet, h) < facet.edgeOn ? facet.behind : kBehindGrazing;
+    float behind = pixels * texelAt(s, h.z / h.w) * facet.perUnit + facet.off;
     return h - warpChange(s, facet.into) * behind;
 }
 

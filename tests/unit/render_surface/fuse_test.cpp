@@ -67,6 +67,35 @@ TEST(Fuse, VotesCountHalfWhereNoiseMayPutASteepSurface) {
     EXPECT_EQ(voteOn(4), shared::Votes::kWholeVote);
 }
 
+TEST(Fuse, WhoSeesBothSidesOfACreaseDoesNotSeePastIt) {
+    // Two faces that meet between two columns of pixels, towards the view and away from it.
+    constexpr float kSlope = 0.002f;  // of q, a pixel
+    constexpr int kMiddle = kTile / 2;
+    for (const bool upright : {true, false}) {
+        for (const float other : {kSlope, 0.6f * kSlope, 0.0f}) {
+            Bundle bundle;
+            bundle.views = {wallAt(2.0f)};
+            for (int y = 0; y < kTile; ++y) {
+                for (int x = 0; x < kTile; ++x) {
+                    const float aside = static_cast<float>(upright ? x : y) + 0.5f - kMiddle;
+                    bundle.views[0].depth.at(x, y) =
+                        1.0f / (0.5f + (aside < 0 ? kSlope * aside : -other * aside));
+                }
+            }
+            SurfaceScene scene(bundle);
+            const LocalSource local{&scene.sources[0], warpFrom(glm::dmat4(1.0))};
+            shared::Votes votes{{{&local, 1}}};
+            const auto voteOn = [&](float q) {
+                const float along = kMiddle + 0.3f;
+                return upright ? votes.voteOf(0, kMiddle, along, q)
+                               : votes.voteOf(0, along, kMiddle, q);
+            };
+            EXPECT_EQ(voteOn(0.5f), shared::Votes::kNoVote) << upright << " " << other;
+            EXPECT_EQ(voteOn(0.5f + kSlope), shared::Votes::kWholeVote) << upright << " " << other;
+        }
+    }
+}
+
 /// What a pixel of four samples shows when two sources show a wall at q = 1 and a third shows
 /// `third`. What they see is nearer than all that: none has a vote against anything.
 Pieces besideTwo(const std::array<std::uint32_t, 4>& third) {
