@@ -14,8 +14,9 @@ constexpr PeakMemory kPreparing = {"drawing", 32};
 constexpr std::uint64_t kPartOfLeft = 2;
 
 /// What a spool holds in memory that is enough, bytes. One picture of 1024x1024 from 64 views as
-/// large, by splats: 10.9 s of processors with 192 MiB, 10.9 with 128, 9.5 with all views in memory
-/// (1.1 GB); by surfaces 7.1, 7.2 and 7.0 s (1.5 GB).
+/// large, by splats: 11.0 s of processors and 0.37 GB with 192 MiB; 10.0 s and 1.11 GB with all
+/// views in memory. By surfaces 8.0 s and 0.51 GB; 7.8 s and 1.49 GB. With 128 MiB as long, 60 MB
+/// less.
 std::uint64_t enoughHeld(const Limits& limits) {
     constexpr std::uint64_t kLeast = 192u << 20;
     return std::max(kLeast, limits.maxMemoryBytes / kSpoolPart);

@@ -348,15 +348,29 @@ PreparedPages preparePages(const PageSet& set, bool wantNormals) {
                                     [](const PageView& v) { return v.hasSplats; });
     std::uint32_t firstPoint = 0;
     for (const Page& page : set.pages()) {
-        PreparedPage& prepared = out.pages.emplace_back();
-        const std::size_t count = page.depth->count();
-        prepared.firstPoint = firstPoint;
-        firstPoint += static_cast<std::uint32_t>(count);
-        prepared.slopes = Pixels<Slope>(count, {}, set.spool());
-        if (wantNormals) prepared.normals = Pixels<glm::i8vec4>(count, {}, set.spool());
-        if (splats && page.splatU && page.splatV)
-            prepared.sizes = Pixels<std::uint8_t>(count, 64, set.spool());
+        out.pages.emplace_back().firstPoint = firstPoint;
+        firstPoint += static_cast<std::uint32_t>(page.depth->count());
     }
+    const auto makeRoom = [&](std::size_t i, PixelSpool* spool) {
+        const Page& page = set.pages()[i];
+        PreparedPage& prepared = out.pages[i];
+        const std::size_t count = page.depth->count();
+        prepared.slopes = Pixels<Slope>(count, {}, spool);
+        if (wantNormals) prepared.normals = Pixels<glm::i8vec4>(count, {}, spool);
+        if (splats && page.splatU && page.splatV)
+            prepared.sizes = Pixels<std::uint8_t>(count, 64, spool);
+    };
+    // The rectangles of a page follow each other. It goes into the spool when they are done: what
+    // is written there bit by bit takes longer.
+    std::optional<std::size_t> inMemory;
+    const auto moveOut = [&] {
+        if (!inMemory || !set.spool()) return;
+        PreparedPage& page = out.pages[*inMemory];
+        page.slopes = Pixels<Slope>(page.slopes, set.spool());
+        page.normals = Pixels<glm::i8vec4>(page.normals, set.spool());
+        page.sizes = Pixels<std::uint8_t>(page.sizes, set.spool());
+        inMemory.reset();
+    };
     for (const PageRectangle& rectangle : set.rectangles()) {
         set.settle();
         if (set.views()[rectangle.view].unread) {
@@ -364,7 +378,13 @@ PreparedPages preparePages(const PageSet& set, bool wantNormals) {
             continue;
         }
         const Window w(set, rectangle);
-        PreparedPage& page = out.pages[rectangle.page];
+        const auto number = static_cast<std::size_t>(rectangle.page);
+        PreparedPage& page = out.pages[number];
+        if (inMemory != number) moveOut();
+        if (page.slopes.empty()) {
+            makeRoom(number, nullptr);
+            inMemory = number;
+        }
         const glm::mat3 cameraFromWorld(
             glm::mat3_cast(glm::conjugate(rectangle.window.orientation)));
         parallelForBlocks(0, rectangle.height, 16, [&](std::int64_t from, std::int64_t to) {
@@ -383,6 +403,9 @@ PreparedPages preparePages(const PageSet& set, bool wantNormals) {
         prepared.rectangle = &rectangle;
         for (auto& r : perRow) prepared.blocks.insert(prepared.blocks.end(), r.begin(), r.end());
     }
+    moveOut();
+    for (std::size_t i = 0; i < out.pages.size(); ++i)
+        if (out.pages[i].slopes.empty()) makeRoom(i, set.spool());
     return out;
 }
 
