@@ -10,7 +10,7 @@ namespace {
 Result<glm::dvec3> upOf(const EnvironmentOptions& options) {
     if (options.up.empty()) return glm::dvec3(0, 1, 0);
     STX_TRY(const auto up, parseDirection(options.up, "--environment-up"));
-    return glm::normalize(up);
+    return glm::normalize(scaledToOne(up));
 }
 
 }  // namespace

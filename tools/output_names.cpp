@@ -30,6 +30,27 @@ bool isNumberedFilm(const std::string& path) {
     return frameName(path, 0) && !fs::exists(path, ec);
 }
 
+/// Whether a file of that name is the main file of a folder.
+bool isMainFile(const std::string& name) {
+    static constexpr std::string_view kMainFiles[] = {
+        "atlas.json",   "transforms.json", "cameras.json", "cameras.txt", "images.txt",
+        "points3D.txt", "cameras.bin",     "images.bin",   "points3D.bin"};
+    return std::ranges::find(kMainFiles, name) != std::end(kMainFiles);
+}
+
+/// An input, and the folders that are read with it: that of a main file, and the one that COLMAP's
+/// "sparse" or "sparse/0" is in.
+std::vector<std::string> placesReadWith(const std::string& path) {
+    std::vector<std::string> places = {path};
+    if (isMainFile(lastName(path))) {
+        const fs::path folder = fs::path(path).parent_path();
+        places.push_back(folder.empty() ? "." : folder.string());
+    }
+    for (const char* inside : {"0", "sparse"})
+        if (lastName(places.back()) == inside) places.push_back(places.back() + "/..");
+    return places;
+}
+
 /// "-o 'b.exr' is the input 'a.exr'".
 std::string clash(const NamedPath& output, const NamedPath& input) {
     return fmt::format("{} '{}' is {} '{}'", output.option, output.path,
@@ -55,7 +76,8 @@ Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
                               const std::vector<NamedPath>& inputs) {
     std::multimap<std::string, const NamedPath*> inputsAt;
     for (const NamedPath& input : inputs)
-        if (auto place = placeOf(input.path)) inputsAt.emplace(std::move(*place), &input);
+        for (const std::string& path : placesReadWith(input.path))
+            if (auto place = placeOf(path)) inputsAt.emplace(std::move(*place), &input);
     std::map<std::string, const NamedPath*> outputAt;
     for (const NamedPath& output : outputs) {
         const auto place = placeOf(output.path);
@@ -91,13 +113,17 @@ std::string lastName(const std::string& path) {
 
 std::vector<NamedPath> alikeAmong(const std::vector<std::string>& inputs,
                                   const std::vector<NamedPath>& outputs) {
-    std::set<std::string> names;
-    for (const NamedPath& output : outputs)
+    std::set<std::string> names, lastNames;
+    for (const NamedPath& output : outputs) {
         for (const fs::path& path : {fs::path(output.path), wholePath(output.path)})
             for (const fs::path& part : path) names.insert(part.string());
+        lastNames.insert(lastName(output.path));
+    }
     std::vector<NamedPath> alike;
+    const auto named = [&](const std::string& path) { return lastNames.contains(lastName(path)); };
     for (const std::string& input : inputs)
-        if (names.contains(lastName(input))) alike.push_back({"", input});
+        if (names.contains(lastName(input)) || std::ranges::any_of(placesReadWith(input), named))
+            alike.push_back({"", input});
     return alike;
 }
 
@@ -112,11 +138,8 @@ void rememberNumberedInputs(const std::vector<NamedPath>& inputs) {
 
 Result<void> checkReportIsNoMainFile(const std::string& report,
                                      const std::vector<NamedPath>& folders) {
-    static constexpr std::string_view kMainFiles[] = {"atlas.json",   "transforms.json",
-                                                      "cameras.json", "cameras.txt",
-                                                      "images.txt",   "points3D.txt"};
     const fs::path file = wholePath(report);
-    if (std::ranges::find(kMainFiles, file.filename().string()) == std::end(kMainFiles)) return {};
+    if (!isMainFile(file.filename().string())) return {};
     for (const NamedPath& folder : folders)
         for (fs::path up = file.parent_path(); up.has_relative_path(); up = up.parent_path())
             if (samePath(up.string(), folder.path))

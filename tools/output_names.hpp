@@ -26,13 +26,14 @@ struct NamedPath {
 [[nodiscard]] bool samePath(const std::string& a, const std::string& b);
 
 /// Errors (usage), before anything is written, where an output is an input, which would be lost, or
-/// another output, of which one would be.
+/// another output, of which one would be. An input that is the main file of a folder, or COLMAP's
+/// folder in one, is that folder, too.
 [[nodiscard]] Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
                                             const std::vector<NamedPath>& inputs);
 
 /// Those of many inputs that may be an output, or a folder that one lies in: their last name is in
-/// its path. To look at each of a million files takes minutes where they are far away; a link of
-/// another name is not found so.
+/// its path, or its last name is that of a folder whose main file they are. To look at each of a
+/// million files takes minutes where they are far away; a link of another name is not found so.
 [[nodiscard]] std::vector<NamedPath> alikeAmong(const std::vector<std::string>& inputs,
                                                 const std::vector<NamedPath>& outputs);
 

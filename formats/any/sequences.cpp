@@ -7,6 +7,7 @@
 #include "formats/any/save.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/files/file_stamp.hpp"
 #include "formats/files/named_files.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/files/numbered.hpp"
@@ -71,11 +72,20 @@ class NumberedSequence : public Sequence {
 };
 
 /// A file of one moment. Its views are given away when they are asked for first, since two would be
-/// twice the memory, and opened again for who asks again.
+/// twice the memory, and opened again for who asks again. That goes by the name, which may be that
+/// of another file by then: an error.
 class StillFile : public Sequence {
   public:
-    StillFile(std::unique_ptr<ViewTable> table, fs::path path, OpenOptions options)
-        : table_(std::move(table)), path_(std::move(path)), options_(std::move(options)) {}
+    StillFile(fs::path path, OpenOptions options)
+        : path_(std::move(path)),
+          options_(std::move(options)),
+          mainFile_(mainFileOf(path_)),
+          stamp_(stampOf(mainFile_)) {}
+    /// To be called once, before all else.
+    Result<void> open(Job& job) {
+        STX_SET(table_, openViews(path_, options_, job));
+        return {};
+    }
     Result<Bundle> frame(std::size_t index, Job& job) override {
         STX_TRY(auto table, views(index, job));
         return wholeBundle(std::move(table), job);
@@ -87,13 +97,26 @@ class StillFile : public Sequence {
         // Its notes have been said.
         Job quiet;
         quiet.workFor(job);
-        return openViews(path_, options_, quiet);
+        auto table = openViews(path_, options_, quiet);
+        // Looked at last: it may also be replaced while it is opened. One that is gone is an error
+        // of opening.
+        if (const auto now = stampOf(mainFile_); now && now != stamp_)
+            return changedError(path_.string());
+        return table;
     }
 
   private:
-    std::unique_ptr<ViewTable> table_;
+    /// An atlas may be a folder, whose own time need not tell of its files.
+    static fs::path mainFileOf(const fs::path& path) {
+        std::error_code ec;
+        return fs::is_directory(path, ec) ? path / "atlas.json" : path;
+    }
+
     fs::path path_;
     OpenOptions options_;
+    fs::path mainFile_;
+    std::optional<FileStamp> stamp_;  ///< from before it was opened
+    std::unique_ptr<ViewTable> table_;
 };
 
 /// When a file's moment is, and how long it is shown, where it tells; and where its points are.
@@ -269,8 +292,9 @@ Result<std::unique_ptr<Sequence>> openFrames(const fs::path& path, const OpenOpt
         return within(fmt::format("'{}'", path.string()),
                       mpeg4::sequenceFromScene(std::move(document), read, job));
     }
-    STX_TRY(auto table, openViews(path, options, job));
-    return std::make_unique<StillFile>(std::move(table), path, options);
+    auto still = std::make_unique<StillFile>(path, options);
+    STX_CHECK(still->open(job));
+    return still;
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <sys/stat.h>
 
 #include <cstdint>
+#include <filesystem>
+#include <optional>
 #include <string_view>
 
 #include "lib/base/result.hpp"
@@ -25,12 +27,19 @@ struct FileStamp {
     bool operator==(const FileStamp&) const = default;
 };
 
-/// The error of one that is not.
+/// The error of one that is not as it was.
 [[nodiscard]] inline tl::unexpected<Error> changedError(std::string_view name) {
     return fail(ErrorCode::invalidInput,
                 "'{}' was changed while it was read: its size or its time is another; start again "
                 "when it is finished",
                 name);
+}
+
+/// Of the file that has a name now; empty where there is none.
+[[nodiscard]] inline std::optional<FileStamp> stampOf(const std::filesystem::path& file) {
+    struct stat status {};
+    if (::stat(file.c_str(), &status) != 0) return {};
+    return FileStamp::of(status);
 }
 
 }  // namespace stx

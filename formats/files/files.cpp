@@ -176,6 +176,7 @@ struct OutputFile::Impl {
     Options options;
     Descriptor fd;
     fs::path temporary;   ///< empty when bytes go straight to `fd`
+    Descriptor lock;      ///< of a direct one's temporary, as `fd` is of others: it is in use
     bool direct = false;  ///< stdout or a device
     bool committed = false;
     /// Whole: only its name is missing, until the others of OutputFiles are whole, too.
@@ -287,6 +288,7 @@ const fs::path& OutputFile::temporaryPath() const {
         removeStaleTemporaries(folder);
         if (auto file = createTemporaryFile(folder)) {
             impl_->temporary = std::move(file->path);
+            impl_->lock = std::move(file->fd);
         } else {
             impl_->temporary = folder / "stx-no-temporary-file";
         }
@@ -311,6 +313,7 @@ Result<void> OutputFile::commit() {
             }
             ::unlink(f.temporary.c_str());
             f.temporary.clear();
+            f.lock.close();
         }
         f.committed = true;
         if (const int error = f.fd.close()) return failIo("write", f.target, error);

@@ -1,5 +1,3 @@
-#include <sys/stat.h>
-
 #include <algorithm>
 #include <atomic>
 #include <optional>
@@ -38,11 +36,6 @@ class FilesOfView {
     }
 
   private:
-    static std::optional<FileStamp> stampOf(const std::filesystem::path& file) {
-        struct stat status {};
-        if (::stat(file.c_str(), &status) != 0) return {};
-        return FileStamp::of(status);
-    }
     std::vector<std::pair<std::filesystem::path, std::optional<FileStamp>>> files_;
 };
 

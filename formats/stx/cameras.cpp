@@ -22,7 +22,7 @@ Result<void> check(const CameraSettings& s) {
                     "the window of an orthographic camera is {:g} high; above 0, or 0 for a "
                     "perspective camera, is expected",
                     s.orthoHeight);
-    if (!(glm::length(s.up) > 0))
+    if (!(glm::length(scaledToOne(s.up)) > 0))
         return fail(ErrorCode::usage, "up is 0,0,0; it must point somewhere");
     return {};
 }

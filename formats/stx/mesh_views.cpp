@@ -34,7 +34,7 @@ Result<ViewFraming> framingOf(const Mesh& mesh, const ConvertSettings& s, bool c
         return fail(ErrorCode::usage,
                     "the field of view is {:g} degrees; it must be above 0 and below 170",
                     glm::degrees(s.fovRad));
-    if (s.up && !(glm::length(*s.up) > 0))
+    if (s.up && !(glm::length(scaledToOne(*s.up)) > 0))
         return fail(ErrorCode::usage, "up is 0,0,0; it must point somewhere");
     ViewFraming framing;
     framing.width = s.width;

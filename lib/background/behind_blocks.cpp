@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "lib/background/behind_layer.hpp"
@@ -115,23 +116,6 @@ Image<float> greatestWithin(const Layer& layer, int radius) {
     return out;
 }
 
-/// Blocks beside hidden ones with something nearer within kMixedPixels.
-void markMixed(Layer& layer) {
-    const int radius = (kMixedPixels + layer.step - 1) / layer.step;
-    const Image<float> nearest = greatestWithin(layer, radius);
-    for (int y = 0; y < layer.photo.y; ++y) {
-        for (int x = 0; x < layer.photo.x; ++x) {
-            const int column = x + layer.border.x, row = y + layer.border.y;
-            Part& part = layer.part.at(column, row);
-            const float own = layer.far.at(column, row);
-            if (part == Part::shown && own >= 0 && nearest.at(x, y) > own + kMixedJump) {
-                part = Part::mixed;
-                layer.parallax.at(column, row) = own;
-            }
-        }
-    }
-}
-
 /// Of a row of values those that are smaller than all within `radius`, each as far as it reaches:
 /// near things that are narrower than twice that are gone (a grey opening).
 std::vector<float> withoutNarrow(std::vector<float> row, int radius) {
@@ -150,15 +134,40 @@ std::vector<float> withoutNarrow(std::vector<float> row, int radius) {
     return row;
 }
 
+/// Of a row of parallaxes those that are not known are the nearest known one's; of two that are as
+/// near, what is farther away.
+std::vector<float> withNearestKnown(std::vector<float> row) {
+    for (std::size_t from = 0; from < row.size();) {
+        if (row[from] >= 0) {
+            ++from;
+            continue;
+        }
+        std::size_t to = from;
+        while (to < row.size() && row[to] < 0) ++to;
+        const float after = to < row.size() ? row[to] : from > 0 ? row[from - 1] : kNoParallax;
+        const float before = from > 0 ? row[from - 1] : after;
+        for (std::size_t i = from; i < to; ++i) {
+            const std::size_t wayBefore = i - from, wayAfter = to - 1 - i;
+            row[i] = wayBefore == wayAfter  ? std::min(before, after)
+                     : wayBefore < wayAfter ? before
+                                            : after;
+        }
+        from = to;
+    }
+    return row;
+}
+
 /// What is at one side of the photograph goes on outwards for `reach` blocks: near things as far as
 /// half of their width, which is all that is known of how long they are.
 void continueSide(Layer& layer, glm::ivec2 corner, glm::ivec2 along, glm::ivec2 outwards, int count,
-                  int reach) {
+                  int reach, NoDepth noDepth) {
     std::vector<float> rim(static_cast<std::size_t>(count));
     for (int i = 0; i < count; ++i) {
         const glm::ivec2 at = corner + i * along;
         rim[i] = layer.front.at(at.x, at.y);
     }
+    // Where nothing is, nothing goes on; what is not known must not narrow what is beside it.
+    if (noDepth == NoDepth::unknown) rim = withNearestKnown(std::move(rim));
     parallelFor(1, reach + 1, [&](int d) {
         const std::vector<float> row = withoutNarrow(rim, d);
         // The corners belong to the side above or below.
@@ -175,13 +184,15 @@ void continueSide(Layer& layer, glm::ivec2 corner, glm::ivec2 along, glm::ivec2 
     });
 }
 
-void continueAround(Layer& layer) {
+void continueAround(Layer& layer, NoDepth noDepth) {
     const glm::ivec2 first = layer.border, last = layer.border + layer.photo - 1;
     const glm::ivec2 size = layer.part.size();
-    continueSide(layer, first, {1, 0}, {0, -1}, layer.photo.x, first.y);
-    continueSide(layer, {first.x, last.y}, {1, 0}, {0, 1}, layer.photo.x, size.y - 1 - last.y);
-    continueSide(layer, first, {0, 1}, {-1, 0}, layer.photo.y, first.x);
-    continueSide(layer, {last.x, first.y}, {0, 1}, {1, 0}, layer.photo.y, size.x - 1 - last.x);
+    continueSide(layer, first, {1, 0}, {0, -1}, layer.photo.x, first.y, noDepth);
+    continueSide(layer, {first.x, last.y}, {1, 0}, {0, 1}, layer.photo.x, size.y - 1 - last.y,
+                 noDepth);
+    continueSide(layer, first, {0, 1}, {-1, 0}, layer.photo.y, first.x, noDepth);
+    continueSide(layer, {last.x, first.y}, {0, 1}, {1, 0}, layer.photo.y, size.x - 1 - last.x,
+                 noDepth);
 }
 
 /// Means of the photograph's colours around each block, of what is at one depth, weighted by a bell
@@ -238,11 +249,26 @@ Layer blocksOf(const ReferenceView& view, double scale, int step, glm::ivec2 bor
         parallelFor(0, layer.photo.y,
                     [&](int y) { sumUpRow(view, least, static_cast<float>(scale), y, layer); });
     }
-    markMixed(layer);
-    continueAround(layer);
+    continueAround(layer, view.noDepth);
     layer.smooth = smoothShown(layer, kFine);
     layer.base = smoothShown(layer, kCoarse);
     return layer;
+}
+
+void markMixed(Layer& layer) {
+    const int radius = (kMixedPixels + layer.step - 1) / layer.step;
+    const Image<float> nearest = greatestWithin(layer, radius);
+    for (int y = 0; y < layer.photo.y; ++y) {
+        for (int x = 0; x < layer.photo.x; ++x) {
+            const int column = x + layer.border.x, row = y + layer.border.y;
+            Part& part = layer.part.at(column, row);
+            const float own = layer.far.at(column, row);
+            if (part == Part::shown && own >= 0 && nearest.at(x, y) > own + kMixedJump) {
+                part = Part::mixed;
+                layer.parallax.at(column, row) = own;
+            }
+        }
+    }
 }
 
 }  // namespace stx::behind

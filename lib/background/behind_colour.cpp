@@ -103,6 +103,15 @@ class Spreading {
             }
         }
     }
+    /// Mixed blocks that nothing reached begin with what the photograph shows there.
+    void beginFromMixed() {
+        for (std::size_t i = 0; i < has_.size(); ++i) {
+            if (has_[i] || layer_.part.data()[i] != Part::mixed) continue;
+            layer_.colour.data()[i] = layer_.shown.data()[i];
+            has_[i] = 1;
+            next_.push_back(i);
+        }
+    }
     void beginFromAll() {
         for (std::size_t i = 0; i < has_.size(); ++i)
             if (has_[i]) next_.push_back(i);
@@ -127,6 +136,9 @@ void firstGuess(Layer& layer) {
     colours.spread(false);
     colours.begin(
         [](const ColourLinks& l, std::size_t a, std::size_t b) { return l.isBehind(a, b); });
+    colours.spread(false);
+    // In gaps that are narrow all is mixed, and still the best that is known of what is there.
+    colours.beginFromMixed();
     colours.spread(false);
     colours.beginFromAll();
     colours.spread(true);

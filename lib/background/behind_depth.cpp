@@ -42,7 +42,8 @@ constexpr std::array<Neighbour, 8> kAround = {{{1, 0, 1},
                                                {-1, -1, kDiagonal}}};
 
 /// Each hidden block takes the parallax of the block beside hidden ones from where the way through
-/// blocks that are before *it* is shortest (Dijkstra).
+/// blocks that are before *it* is shortest (Dijkstra). Blocks that nothing reaches become `shown`,
+/// and are what is behind others in turn: so is a wall with empty holes, behind which is nothing.
 void takeNearestBehind(Layer& layer) {
     const int w = layer.width(), h = layer.height();
     Image<float> way(w, h, std::numeric_limits<float>::infinity());
@@ -64,16 +65,38 @@ void takeNearestBehind(Layer& layer) {
         for (int x = layer.border.x; x < layer.border.x + layer.photo.x; ++x)
             if (layer.part.at(x, y) != Part::hidden && layer.far.at(x, y) >= 0)
                 spread(x, y, 0, layer.far.at(x, y));
-    while (!open.empty()) {
-        const Reached next = open.top();
-        open.pop();
-        const int x = next.block % w, y = next.block / w;
-        if (next.way > way.at(x, y)) continue;
-        spread(x, y, next.way, layer.parallax.at(x, y));
-    }
+    const auto goOn = [&] {
+        while (!open.empty()) {
+            const Reached next = open.top();
+            open.pop();
+            const int x = next.block % w, y = next.block / w;
+            if (next.way > way.at(x, y)) continue;
+            spread(x, y, next.way, layer.parallax.at(x, y));
+        }
+    };
+    goOn();
+    std::vector<std::int32_t> left;
     for (std::size_t i = 0; i < way.count(); ++i)
         if (layer.part.data()[i] == Part::hidden && std::isinf(way.data()[i]))
-            layer.part.data()[i] = Part::shown;
+            left.push_back(static_cast<std::int32_t>(i));
+    const float* front = layer.front.data();
+    std::ranges::sort(left, [&](std::int32_t a, std::int32_t b) {
+        return front[a] != front[b] ? front[a] < front[b] : a < b;
+    });
+    for (std::size_t begin = 0; begin < left.size();) {
+        // The farthest ones, all that are not behind each other, at once: one by one each would
+        // reach again much of what the one before did.
+        const float last = front[left[begin]] + kBehind;
+        std::size_t end = begin;
+        for (; end < left.size() && front[left[end]] <= last; ++end)
+            if (std::isinf(way.data()[left[end]])) layer.part.data()[left[end]] = Part::shown;
+        for (; begin < end; ++begin) {
+            const std::int32_t block = left[begin];
+            if (layer.part.data()[block] == Part::shown)
+                spread(block % w, block / w, 0, layer.far.data()[block]);
+        }
+        goOn();
+    }
 }
 
 /// Makes the parallax of hidden blocks smooth where neighbours are one surface.
@@ -122,6 +145,7 @@ void smoothBehind(Layer& layer) {
 
 void inventDepth(Layer& layer) {
     takeNearestBehind(layer);
+    markMixed(layer);
     smoothBehind(layer);
 }
 

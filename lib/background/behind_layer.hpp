@@ -43,7 +43,8 @@ struct Layer {
     }
 };
 
-/// Parallax of pixels that show nothing, or nobody knows how far away: it never limits anything.
+/// Parallax of pixels that show nothing, or nobody knows how far away. It never limits anything but
+/// what goes on around the frame: nothing does where nothing is (NoDepth::empty).
 inline constexpr float kNoParallax = -1.0f;
 
 /// Parallaxes that differ by no more, in pixels, are one surface for what links neighbours. Stairs
@@ -71,15 +72,18 @@ inline constexpr float kUncovered = 0.5f;
                     kOneSurfaceOfJump * (layer.front.data()[block] - layer.parallax.data()[block]));
 }
 
-/// The blocks of a view, with the parts and all that the photograph says; nothing is invented yet.
-/// `scale`: parallax times distance; `border`: pixels at the left and above, multiples of `step`;
-/// `size`: of the larger picture, pixels.
+/// The blocks of a view, with all that the photograph says and the parts but `mixed`; nothing is
+/// invented yet. `scale`: parallax times distance; `border`: pixels at the left and above,
+/// multiples of `step`; `size`: of the larger picture, pixels.
 [[nodiscard]] Layer blocksOf(const ReferenceView& view, double scale, int step, glm::ivec2 border,
                              glm::ivec2 size);
 
+/// Makes shown blocks mixed that something nearer is within a few pixels of.
+void markMixed(Layer& layer);
+
 /// Gives hidden blocks a depth: that of the nearest block beside them that is behind them, made
-/// smooth. Blocks that nothing behind reaches become `shown`. Colours of mixed blocks are then the
-/// only other thing that is missing.
+/// smooth. Blocks that nothing behind reaches become `shown`; then mixed ones are marked. Colours
+/// of these are then the only other thing that is missing.
 void inventDepth(Layer& layer);
 
 /// The parallax of what is invented without steps, around the frame, too: nothing is behind them,
@@ -89,7 +93,7 @@ void inventDepth(Layer& layer);
 
 /// Gives hidden and mixed blocks and those around a colour: the smoothest one that goes on what is
 /// beside them at their depth. Blocks that nothing at their depth reaches take the nearest farther
-/// colour.
+/// colour, and where all that shows what is behind is mixed, its own.
 void inventColour(Layer& layer);
 
 /// For each block where in the photograph what is like it is seen; -1: nowhere. Both count in

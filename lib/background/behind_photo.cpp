@@ -158,10 +158,14 @@ Result<BehindPhoto> behindPhoto(const ReferenceView& view, const BehindSettings&
 }
 
 std::string AddedBehind::note(const BehindSettings& settings) const {
+    // Two digits, and whole percents from 10 on.
+    const double percent = 100 * hidden;
+    const std::string share =
+        percent < 10 ? fmt::format("{:.2g}", percent) : fmt::format("{:.0f}", percent);
     return fmt::format(
         "what the photograph hides from an eye that goes up to {:g} % of the median distance to "
-        "the side was invented: {:.2g} % of its pixels, and a border of {}x{}",
-        settings.shiftPercent, 100 * hidden, border.x, border.y);
+        "the side was invented: {} % of its pixels, and a border of {}x{}",
+        settings.shiftPercent, share, border.x, border.y);
 }
 
 Result<AddedBehind> addBehind(Bundle& bundle, const BehindSettings& settings, Job& job) {

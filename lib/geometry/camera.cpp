@@ -1,5 +1,6 @@
 #include "lib/geometry/camera.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace stx {
@@ -84,7 +85,19 @@ Result<void> Camera::check() const {
     return {};
 }
 
+glm::dvec3 scaledToOne(glm::dvec3 direction) {
+    const glm::dvec3 size = glm::abs(direction);
+    const double largest = std::max({size.x, size.y, size.z});
+    if (!(largest > 0) || !std::isfinite(largest)) return direction;
+    int exponent = 0;
+    (void)std::frexp(largest, &exponent);
+    // By each: 2 to that power may itself be no double.
+    for (int k = 0; k < 3; ++k) direction[k] = std::ldexp(direction[k], -exponent);
+    return direction;
+}
+
 Result<glm::dquat> lookAt(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up) {
+    up = scaledToOne(up);
     const auto text = [](glm::dvec3 v) {
         return fmt::format("({:.10g},{:.10g},{:.10g})", v.x, v.y, v.z);
     };

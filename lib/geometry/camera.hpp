@@ -74,6 +74,10 @@ struct Camera {
     bool operator==(const Camera&) const = default;
 };
 
+/// A direction times the power of two that makes its largest component 0.5 to 1: its length can be
+/// taken whatever it was, and its bits stay. As it is where it is 0 or not finite.
+[[nodiscard]] glm::dvec3 scaledToOne(glm::dvec3 direction);
+
 /// Orientation of a camera at `eye` that looks at `target`; `up` need not be orthogonal. Errors
 /// (usage) when they coincide, are not finite or lie 1e150 and more apart; an `up` along the line
 /// of sight is replaced by another axis.

@@ -41,7 +41,12 @@ PixelSpace::PixelSpace(const Camera& c, double farthest, double across) : camera
         axis.origin = farthest + axis.unit;
     }
     axis.pixel = 1.0 / std::max(c.fx, c.fy);
-    axis.coarse = std::max(1.0, axis.pixel / (axis.inverse ? 1.0 : axis.unit) / kFinePixel);
+    // Of what a telephoto camera sees, shares of its distance would bridge all steps: they are
+    // those of so many times half of its picture, as in an orthographic one.
+    const double seen =
+        axis.inverse ? kMostRadii * 0.5 * std::max(c.width / c.fx, c.height / c.fy) : 1.0;
+    axis.coarse =
+        std::max(std::min(1.0, seen), axis.pixel / (axis.inverse ? 1.0 : axis.unit) / kFinePixel);
     // Columns of camera points (X, Y, Z, 1) up to scale over (x, y, q, 1), and back.
     glm::dmat4 cameraFromPixel(0.0), pixelFromCamera(0.0);
     cameraFromPixel[0][0] = 1.0 / c.fx;

@@ -40,7 +40,9 @@ struct DepthAxis {
     double origin = 0.0;  ///< scene units, orthographic only
     double unit = 1.0;    ///< scene units, orthographic only
     double pixel = 0.0;   ///< side of a pixel: share of the distance; orthographic: scene units
-    double coarse = 1.0;  ///< what a pixel is as a share of q, in parts of kFinePixel; at least 1
+    /// What a pixel is as a share of q, in parts of kFinePixel; at least 1, or less where pictures
+    /// are narrower than an eighth of their distance.
+    double coarse = 1.0;
 
     [[nodiscard]] double q(double dist) const {
         return inverse ? 1.0 / dist : (origin - dist) / unit;

@@ -72,7 +72,7 @@ glm::dvec3 hemiOctahedralDirection(int i, int j, int n) {
 }
 
 glm::dquat rotationToUp(glm::dvec3 up) {
-    const glm::dvec3 from(0, 1, 0), to = glm::normalize(up);
+    const glm::dvec3 from(0, 1, 0), to = glm::normalize(scaledToOne(up));
     const double cosine = glm::dot(from, to);
     if (cosine > 1 - 1e-15) return {1, 0, 0, 0};
     if (cosine < -1 + 1e-9) return {0, 1, 0, 0};  // half a turn about X
@@ -209,7 +209,7 @@ Result<std::vector<Camera>> layoutCameras(const ViewLayout& layout, const ViewFr
                                           const std::vector<glm::vec3>& points) {
     if (points.empty()) return fail(ErrorCode::invalidInput, "the object has no points to look at");
     const auto sphere = boundingSphere(points);
-    if (!(glm::length(framing.up) > 0))
+    if (!(glm::length(scaledToOne(framing.up)) > 0))
         return fail(ErrorCode::usage, "up is 0,0,0; it must point somewhere");
     auto directions = layoutDirections(layout);
     // The faces of a cube are those of the axes, whichever is up.

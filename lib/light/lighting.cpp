@@ -81,15 +81,24 @@ Result<void> Lighting::check() const {
 }
 
 Lighting lightsInWorld(const Lighting& lighting, const glm::dmat4& worldFromCamera) {
+    // A point light beyond this is as good as a directional one, and floats cannot square the
+    // length of the way to one at 1e20.
+    constexpr double kFarAway = 1e15;
     Lighting out = lighting;
     for (auto& light : out.lights) {
         // Floats cannot square the length of each direction.
         if (light.kind == Light::Kind::directional && light.vector != glm::vec3(0.0f))
             light.vector = glm::vec3(glm::normalize(glm::dvec3(light.vector)));
-        if (!light.inCameraSpace) continue;
-        const double w = light.kind == Light::Kind::point ? 1.0 : 0.0;
-        light.vector = glm::vec3(worldFromCamera * glm::dvec4(light.vector, w));
+        const bool point = light.kind == Light::Kind::point;
+        glm::dvec3 vector(light.vector);
+        if (light.inCameraSpace)
+            vector = glm::dvec3(worldFromCamera * glm::dvec4(vector, point ? 1.0 : 0.0));
         light.inCameraSpace = false;
+        if (point && glm::length(vector) > kFarAway) {
+            light.kind = Light::Kind::directional;
+            vector = -glm::normalize(vector);
+        }
+        light.vector = glm::vec3(vector);
     }
     return out;
 }

@@ -46,7 +46,8 @@ struct Lighting {
 [[nodiscard]] glm::vec3 shadePhong(const Lighting& lighting, glm::vec3 albedo, glm::vec3 position,
                                    glm::vec3 normal, glm::vec3 toEye, bool linear);
 
-/// The lights with camera-space ones turned into the world of a camera.
+/// The lights with camera-space ones turned into the world of a camera. Point lights that are too
+/// far away for floats become directional ones.
 [[nodiscard]] Lighting lightsInWorld(const Lighting& lighting, const glm::dmat4& worldFromCamera);
 
 }  // namespace stx

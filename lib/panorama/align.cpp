@@ -443,7 +443,7 @@ Result<Start> startByFeatures(Series& s, const PanoramaSettings& settings, doubl
     start.focal = search.focal;
     double focal = search.focal;
     for (int round = 0; round < kMostRounds; ++round) {
-        const PictureTree tree = treeOf(count, s.pairs);
+        const PictureTree tree = treeOf(count, s.pairs, settings.closeLoop);
         if (tree.order.size() < 2)
             return fail(ErrorCode::invalidInput,
                         "no two of the {} pictures show the same from one place; neighbours must "
@@ -452,12 +452,8 @@ Result<Start> startByFeatures(Series& s, const PanoramaSettings& settings, doubl
         if (settings.closeLoop && !given) focal = focalByClosing(tree, s.pairs, focal);
         s.model = chain(tree, s.pairs, {focal, 0});
         if (!settings.closeLoop) {
-            const auto closing = pairsThatClose(tree, s.pairs, s.model);
-            for (auto p = closing.rbegin(); p != closing.rend(); ++p) {
-                const Pair& pair = s.pairs[*p];
-                start.forbidden.emplace_back(pair.a, pair.b);
-                s.pairs.erase(s.pairs.begin() + *p);
-            }
+            const auto closing = dropPairsThatClose(tree, s.pairs, s.model);
+            start.forbidden.insert(start.forbidden.end(), closing.begin(), closing.end());
             if (!closing.empty()) continue;
         }
         adjustCoarseToFine(s.model, s.pairs, s.adjusting);
@@ -470,8 +466,9 @@ Result<Start> startByFeatures(Series& s, const PanoramaSettings& settings, doubl
 
 /// Adjusts by matches of patches, and drops those that do not fit. Gives the pairs with all their
 /// matches. Errors: cancelled.
-Result<std::vector<Pair>> adjustByPatches(Series& s, const Start& start, bool focalGiven,
-                                          Job& job) {
+Result<std::vector<Pair>> adjustByPatches(Series& s, const Start& start,
+                                          const PanoramaSettings& settings, Job& job) {
+    const auto count = static_cast<int>(s.copies.size());
     s.pyramids.resize(s.copies.size());
     parallelFor(0, s.copies.size(), [&](std::size_t k) {
         if (s.model.known[k]) s.pyramids[k] = pyramidOf(s.copies[k].grey);
@@ -479,6 +476,9 @@ Result<std::vector<Pair>> adjustByPatches(Series& s, const Start& start, bool fo
     std::vector<Pair> all;
     for (const double reach : kPatchReaches) {
         STX_CHECK(matchPatches(s, start.pairs, start.forbidden, reach, job));
+        // Features did not see all pairs that patches do.
+        if (!settings.closeLoop)
+            dropPairsThatClose(treeOf(count, s.pairs, false), s.pairs, s.model);
         if (all.empty()) all = s.pairs;
         for (const double pixels : kAfterPatches) {
             s.adjusting.noisePixels = noiseOf(s);
@@ -486,7 +486,7 @@ Result<std::vector<Pair>> adjustByPatches(Series& s, const Start& start, bool fo
             adjust(s.model, s.pairs, s.adjusting);
         }
         adjustToMost(s);
-        if (!focalGiven && !s.adjusting.ownFocals) tryOwnFocals(s);
+        if (settings.fieldOfView <= 0 && !s.adjusting.ownFocals) tryOwnFocals(s);
     }
     for (const double most : kFits) {
         keepWhatFits(s, most);
@@ -499,9 +499,9 @@ Result<std::vector<Pair>> adjustByPatches(Series& s, const Start& start, bool fo
 /// Leaves out pictures that are in no pair any more, with a note; the tree of the others. Errors:
 /// fewer than two are left.
 Result<PictureTree> leaveOutStrangers(PictureSource& source, const std::vector<int>& twins,
-                                      Series& s, Job& job) {
+                                      bool closeLoop, Series& s, Job& job) {
     const int count = source.count();
-    PictureTree tree = treeOf(count, s.pairs);
+    PictureTree tree = treeOf(count, s.pairs, closeLoop);
     std::vector<std::string> strangers;
     for (int k = 0; k < count; ++k) {
         const auto i = static_cast<std::size_t>(k);
@@ -565,13 +565,13 @@ Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSet
     s.adjusting.pixel = pixel;
     STX_TRY(const auto start, startByFeatures(s, settings, focalHintOf(source, settings, s), job));
     const bool focalGiven = settings.fieldOfView > 0;
-    STX_TRY(const auto all, adjustByPatches(s, start, focalGiven, job));
+    STX_TRY(const auto all, adjustByPatches(s, start, settings, job));
 
     PanoramaAlignment out;
     describePairs(s, all, out);
-    STX_TRY(const auto tree, leaveOutStrangers(source, twins, s, job));
+    STX_TRY(const auto tree, leaveOutStrangers(source, twins, settings.closeLoop, s, job));
     const auto closing = pairsThatClose(tree, s.pairs, s.model);
-    out.closed = !closing.empty();
+    out.closed = settings.closeLoop && !closing.empty();
     if (out.closed) {
         const TurnModel byPairs = chain(tree, s.pairs, {start.focal, 0});
         out.gapBefore = gapOf(byPairs, s.pairs, closing, true);

@@ -1,5 +1,6 @@
 #include "lib/panorama/order.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -21,6 +22,9 @@ constexpr double kMostOff = 1.0;
 /// The search for what is up: its first step and the least one, radians, and by how much a start's
 /// cost must be below that of the starts before it.
 constexpr double kFirstUpStep = 0.2, kLastUpStep = 2e-6, kLessCost = 1e-6;
+/// The cosine of 20 degrees: pictures that look along what is up or down, or are no farther off,
+/// have no direction around it to speak of. A small turn of theirs is a large one around it.
+constexpr double kAlongUp = 0.94;
 
 /// A direction across another one: of the X and Z axis one that is not nearly along it.
 glm::dvec3 anyAcross(glm::dvec3 direction) {
@@ -68,14 +72,39 @@ double wrapped(double angle) {
     return angle - 2 * M_PI * std::round(angle / (2 * M_PI));
 }
 
-}  // namespace
+/// The direction in which a picture looks.
+glm::dvec3 aheadOf(const TurnModel& model, std::size_t k) {
+    return model.worldFromCamera[k] * glm::dvec3(0, 0, -1);
+}
 
-PictureTree treeOf(int pictures, const std::vector<Pair>& pairs) {
+/// Of each picture, whether it is known and looks around `up` and not along it; where none does,
+/// whether it is known.
+std::vector<bool> thatLookAround(const TurnModel& model, glm::dvec3 up) {
+    std::vector<bool> around = model.known;
+    for (std::size_t k = 0; k < around.size(); ++k)
+        around[k] = around[k] && std::abs(glm::dot(aheadOf(model, k), up)) <= kAlongUp;
+    const bool some = std::find(around.begin(), around.end(), true) != around.end();
+    return some ? around : model.known;
+}
+
+/// A pair's place in the order in which a tree is made: those of a lower rank before all others,
+/// those of the last one never.
+enum class Rank { first, usual, overTheJoint, never };
+
+/// Whether a pair goes from the last pictures to the first, or so it seems by their numbers.
+Rank rankOf(const Pair& pair, int pictures, bool closeLoop) {
+    return !closeLoop && 2 * (pair.b - pair.a) > pictures ? Rank::overTheJoint : Rank::usual;
+}
+
+PictureTree treeByRank(int pictures, const std::vector<Pair>& pairs,
+                       const std::vector<Rank>& ranks) {
     const auto count = static_cast<std::size_t>(pictures);
-    std::vector<std::size_t> strongest(pairs.size());
-    std::iota(strongest.begin(), strongest.end(), std::size_t{0});
+    std::vector<std::size_t> strongest;
+    for (std::size_t p = 0; p < pairs.size(); ++p)
+        if (ranks[p] != Rank::never) strongest.push_back(p);
     std::stable_sort(strongest.begin(), strongest.end(), [&](std::size_t x, std::size_t y) {
-        return pairs[x].matches.size() > pairs[y].matches.size();
+        return ranks[x] != ranks[y] ? ranks[x] < ranks[y]
+                                    : pairs[x].matches.size() > pairs[y].matches.size();
     });
     // Kruskal's tree.
     std::vector<int> group(count);
@@ -123,6 +152,16 @@ PictureTree treeOf(int pictures, const std::vector<Pair>& pairs) {
             tree.order.push_back(other);
         }
     }
+    return tree;
+}
+
+}  // namespace
+
+PictureTree treeOf(int pictures, const std::vector<Pair>& pairs, bool closeLoop) {
+    std::vector<Rank> ranks;
+    for (const Pair& pair : pairs) ranks.push_back(rankOf(pair, pictures, closeLoop));
+    PictureTree tree = treeByRank(pictures, pairs, ranks);
+    tree.closeLoop = closeLoop;
     return tree;
 }
 
@@ -176,6 +215,22 @@ double unlikelihood(const glm::dmat3& frame, glm::dvec3 up) {
            kSteep * (1 - std::exp(-pitch * pitch / kSteep));
 }
 
+/// The direction to which one axis of all cameras is nearest to being across, 0 = X, 1 = Y; on the
+/// side of the other one of these, as a camera's own top and side are.
+glm::dvec3 acrossAll(const std::vector<glm::dmat3>& frames, int axis) {
+    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+    glm::dvec3 others(0);
+    for (const auto& frame : frames) {
+        const Eigen::Vector3d v(frame[axis].x, frame[axis].y, frame[axis].z);
+        squares += v * v.transpose();
+        others += frame[1 - axis];
+    }
+    const Eigen::Vector3d least =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(squares).eigenvectors().col(0);
+    const glm::dvec3 across(least.x(), least.y(), least.z());
+    return glm::dot(across, others) < 0 ? -across : across;
+}
+
 }  // namespace
 
 glm::dvec3 upOf(const TurnModel& model) {
@@ -187,35 +242,46 @@ glm::dvec3 upOf(const TurnModel& model) {
         for (const auto& frame : frames) cost += unlikelihood(frame, up);
         return cost;
     };
-    // From each camera's own top and sides, always downhill, in steps that shrink.
+    // From each camera's own top and sides, and, since no camera's top is near to what is up where
+    // all look steeply up or down, from across the sides of all, or the tops of those on their
+    // side.
     constexpr std::size_t kMostStarts = 24;
-    double best = std::numeric_limits<double>::max();
-    glm::dvec3 bestUp(0, 1, 0);
+    std::vector<glm::dvec3> starts;
     const std::size_t stride = (frames.size() + kMostStarts - 1) / kMostStarts;
     for (std::size_t k = 0; k < frames.size(); k += stride)
-        for (const glm::dvec3 start : {frames[k][1], frames[k][0], -frames[k][0]}) {
-            glm::dvec3 up = start;
-            double cost = costOfUp(up);
-            for (double step = kFirstUpStep; step > kLastUpStep;) {
-                const glm::dvec3 across = anyAcross(up);
-                const glm::dvec3 along = glm::cross(up, across);
-                bool better = false;
-                for (const glm::dvec3 d : {across, -across, along, -along}) {
-                    const glm::dvec3 next = glm::normalize(up + step * d);
-                    const double now = costOfUp(next);
-                    if (!(now < cost)) continue;
-                    cost = now;
-                    up = next;
-                    better = true;
-                    break;
-                }
-                if (!better) step *= 0.5;
+        for (const glm::dvec3 start : {frames[k][1], frames[k][0], -frames[k][0]})
+            starts.push_back(start);
+    for (const int axis : {0, 1}) {
+        const glm::dvec3 across = acrossAll(frames, axis);
+        starts.push_back(across);
+        starts.push_back(-across);
+    }
+    double best = std::numeric_limits<double>::max();
+    glm::dvec3 bestUp(0, 1, 0);
+    // Always downhill, in steps that shrink.
+    for (const glm::dvec3 start : starts) {
+        glm::dvec3 up = start;
+        double cost = costOfUp(up);
+        for (double step = kFirstUpStep; step > kLastUpStep;) {
+            const glm::dvec3 across = anyAcross(up);
+            const glm::dvec3 along = glm::cross(up, across);
+            bool better = false;
+            for (const glm::dvec3 d : {across, -across, along, -along}) {
+                const glm::dvec3 next = glm::normalize(up + step * d);
+                const double now = costOfUp(next);
+                if (!(now < cost)) continue;
+                cost = now;
+                up = next;
+                better = true;
+                break;
             }
-            if (cost < best - kLessCost) {
-                best = cost;
-                bestUp = up;
-            }
+            if (!better) step *= 0.5;
         }
+        if (cost < best - kLessCost) {
+            best = cost;
+            bestUp = up;
+        }
+    }
     return bestUp;
 }
 
@@ -223,35 +289,59 @@ std::vector<int> pairsThatClose(const PictureTree& tree, const std::vector<Pair>
                                 const TurnModel& model) {
     const glm::dvec3 up = upOf(model);
     const glm::dvec3 zero = anyAcross(up);
-    const auto forward = [&](int k) { return model.worldFromCamera[k] * glm::dvec3(0, 0, -1); };
+    const auto yaw = [&](int k) {
+        return yawOf(aheadOf(model, static_cast<std::size_t>(k)), up, zero);
+    };
+    // The tree without pictures that look along what is up, and joined anew where they joined it.
+    const std::vector<bool> around = thatLookAround(model, up);
+    const auto pictures = static_cast<int>(tree.parent.size());
+    std::vector<Rank> ranks;
+    for (std::size_t p = 0; p < pairs.size(); ++p) {
+        const bool both = around[pairs[p].a] && around[pairs[p].b];
+        const Rank others =
+            tree.inTree[p] ? Rank::first : rankOf(pairs[p], pictures, tree.closeLoop);
+        ranks.push_back(both ? others : Rank::never);
+    }
+    const PictureTree way = treeByRank(pictures, pairs, ranks);
     // How far each picture is turned from the root, along the tree.
     std::vector<double> turned(tree.parent.size(), 0.0);
-    for (const int k : tree.order) {
+    for (const int k : way.order) {
         const auto i = static_cast<std::size_t>(k);
-        if (tree.parent[i] < 0) continue;
-        turned[i] = turned[tree.parent[i]] +
-                    wrapped(yawOf(forward(k), up, zero) - yawOf(forward(tree.parent[i]), up, zero));
+        if (way.parent[i] < 0) continue;
+        turned[i] = turned[way.parent[i]] + wrapped(yaw(k) - yaw(way.parent[i]));
     }
     std::vector<int> closing;
     for (std::size_t p = 0; p < pairs.size(); ++p) {
         const auto a = static_cast<std::size_t>(pairs[p].a);
         const auto b = static_cast<std::size_t>(pairs[p].b);
-        if (tree.inTree[p] || !model.known[a] || !model.known[b]) continue;
+        if (ranks[p] == Rank::never || way.inTree[p]) continue;
         // Where b is by this pair's own turn, seen from a.
         const glm::dquat byPair = model.worldFromCamera[a] * glm::inverse(pairs[p].bFromA);
-        const double own = wrapped(yawOf(byPair * glm::dvec3(0, 0, -1), up, zero) -
-                                   yawOf(forward(pairs[p].a), up, zero));
+        const double own =
+            wrapped(yawOf(byPair * glm::dvec3(0, 0, -1), up, zero) - yaw(pairs[p].a));
         if (std::abs(turned[b] - turned[a] - own) > M_PI) closing.push_back(static_cast<int>(p));
     }
     return closing;
 }
 
+std::vector<std::pair<int, int>> dropPairsThatClose(const PictureTree& tree,
+                                                    std::vector<Pair>& pairs,
+                                                    const TurnModel& model) {
+    std::vector<std::pair<int, int>> dropped;
+    const auto closing = pairsThatClose(tree, pairs, model);
+    for (auto p = closing.rbegin(); p != closing.rend(); ++p) {
+        dropped.emplace_back(pairs[*p].a, pairs[*p].b);
+        pairs.erase(pairs.begin() + *p);
+    }
+    return dropped;
+}
+
 glm::dquat levelTurn(const TurnModel& model, glm::dvec3 up, bool closed) {
     const glm::dvec3 zero = anyAcross(up);
     std::vector<double> yaws;
-    for (std::size_t k = 0; k < model.known.size(); ++k)
-        if (model.known[k])
-            yaws.push_back(yawOf(model.worldFromCamera[k] * glm::dvec3(0, 0, -1), up, zero));
+    const std::vector<bool> around = thatLookAround(model, up);
+    for (std::size_t k = 0; k < around.size(); ++k)
+        if (around[k]) yaws.push_back(yawOf(aheadOf(model, k), up, zero));
     double middle = yaws.front();
     if (!closed) {
         // Opposite to the middle of the widest gap.

@@ -93,9 +93,14 @@ bool insideOf(const Image<float>& image, glm::dvec2 pixel, double margin) {
 
 /// Moves `to` until the patches agree on one level; their correlation, 0 when they do not.
 double moveOnLevel(const Image<float>& a, const Image<float>& b, double scale, PatchMove& move) {
-    // Where the patch reaches in the other picture.
+    const glm::vec2 xx = move.xx * static_cast<float>(0.5 / scale),
+                    xy = move.xy * static_cast<float>(1 / scale),
+                    yy = move.yy * static_cast<float>(0.5 / scale);
+    // Where the patch reaches in the other picture, at most; wide lenses bend it a lot.
+    constexpr double kFarthest = kRadius + 1;
     const double reach =
-        (kRadius + 1) * (glm::length(move.toFromFrom[0]) + glm::length(move.toFromFrom[1])) + 2;
+        kFarthest * (glm::length(move.toFromFrom[0]) + glm::length(move.toFromFrom[1])) +
+        kFarthest * kFarthest * (glm::length(xx) + glm::length(xy) + glm::length(yy)) + 2;
     const glm::dvec2 from = move.from * scale;
     if (!(reach < kMostReach) || !insideOf(a, from, kRadius + 2)) return 0;
     Window target;
@@ -108,9 +113,6 @@ double moveOnLevel(const Image<float>& a, const Image<float>& b, double scale, P
     if (target.deviation < kFlat) return 0;
     glm::dvec2 to = move.to * scale;
     double correlation = 0;
-    const glm::vec2 xx = move.xx * static_cast<float>(0.5 / scale),
-                    xy = move.xy * static_cast<float>(1 / scale),
-                    yy = move.yy * static_cast<float>(0.5 / scale);
     constexpr int kWide = kSide + 2;
     std::array<float, kWide * kWide> wide;
     for (int step = 0; step < kPatchSteps; ++step) {

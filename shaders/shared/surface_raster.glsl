@@ -1,7 +1,8 @@
 // A source drawn as a surface into a tile: the nearest q at each sample. The processor does the same
 // with vectors in lib/render/surface/cpu/raster.cpp; a test holds both against this. From outside:
 //   vec4 toSamples(x, y, q)      a position in the source as sample position and q, homogeneous
-//   int SIDE, float qLimit()     samples along a side of the tile, the largest q
+//   int SIDE, float qLimit()     samples along a side of the tile, the largest q: what is nearer is behind an
+//                                orthographic camera
 //   Axis frameAxis(), float relativeScale(Axis, q)  of the frame: see surface_votes.glsl
 //   bool mayDraw(x, y, behind)   whether a sample is free or holds less than `behind`: extensions are
 //                                drawn only there
@@ -15,7 +16,7 @@ void scan(vec4 ex, vec4 ey, vec4 e0, vec3 plane, float qMin, float qMax, vec2 lo
     float apart = (flags & kRimBit) != 0u ? kBehindRim : kLinkedSamples;
     float behind = (flags & kCoversBit) != 0u ? qMin - apart * relativeScale(frameAxis(), qMin) : 0.0f;
     vec2 from = max(low, vec2(0.0f)), to = min(high, vec2(float(SIDE - 1)));
-    if (!(from.x <= to.x && from.y <= to.y) || !(qMin > 0.0f) || !(qMax <= qLimit())) return;
+    if (!(from.x <= to.x && from.y <= to.y) || !(qMin > 0.0f) || !(qMin <= qLimit())) return;
     ivec2 first = ivec2(ceil(from)), last = ivec2(floor(to));
     // All of the box is outside of one edge, as of most that reach far beyond the frame.
     vec4 most = max(ex * float(first.x), ex * float(last.x)) + (max(ey * float(first.y), ey * float(last.y)) + e0);
@@ -25,6 +26,7 @@ void scan(vec4 ex, vec4 ey, vec4 e0, vec3 plane, float qMin, float qMax, vec2 lo
             vec4 e = ex * float(x) + (ey * float(y) + e0);
             if (min(min(e.x, e.y), min(e.z, e.w)) < 0.0f || !mayDraw(x, y, behind)) continue;
             float q = clamp(plane.x * float(x) + (plane.y * float(y) + plane.z), qMin, qMax);
+            if (!(q <= qLimit())) continue;
             raise(x, y, (floatBitsToUint(q) & ~kSampleFlags) | (flags & kSampleFlags));
         }
     }

@@ -203,7 +203,7 @@ Facet facetOf(int s, float x, float y, float q, bool measured) {
     float least = kEdgeOn * (measured ? sqrt(1.0f + slope * slope) : 1.0f);
     float tilt = facet.off / (facet.perUnit * texel);
     facet.edgeOn = least + tilt;
-    facet.grazing = least * (measured ? coarseOf(s) : 1.0f) + tilt;
+    facet.grazing = least * (measured ? max(coarseOf(s), 1.0f) : 1.0f) + tilt;
     facet.behind = measured ? kBehindMeasured : kBehindTexel;
     return facet;
 }

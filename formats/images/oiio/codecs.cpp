@@ -332,6 +332,8 @@ void encodeOrThrow(const EncodeRequest& request) {
     if (!output->open(request.path, spec)) cannotWrite(output->geterror());
     if (!output->write_image(OIIO::TypeDesc::UINT8, request.values) || !output->close())
         cannotWrite(output->geterror());
+    // close() is true whatever becomes of the last strip and the directory, which are written then.
+    if (!endsWhole(request.path)) cannotWrite("it is not whole; is the disk full?");
 }
 
 /// Loads what the library looks for when its first file comes.

@@ -7,6 +7,7 @@
 #include <cstdarg>
 #include <cstdint>
 #include <cstdio>
+#include <memory>
 #include <string_view>
 
 #include "formats/images/tiff_numbers.hpp"
@@ -79,6 +80,17 @@ TiffErrors::~TiffErrors() {
 
 const std::string& TiffErrors::first() {
     return kept().first;
+}
+
+bool endsWhole(const char* path) {
+    // Not mapped: a file that is too short would end the process.
+    const std::unique_ptr<TIFF, void (*)(TIFF*)> file(TIFFOpen(path, "rm"), &TIFFClose);
+    if (!file) return false;
+    const std::uint32_t strips = TIFFNumberOfStrips(file.get());
+    const tmsize_t size = TIFFStripSize(file.get());
+    if (strips == 0 || size <= 0) return false;
+    std::vector<std::byte> last(static_cast<std::size_t>(size));
+    return TIFFReadEncodedStrip(file.get(), strips - 1, last.data(), size) > 0;
 }
 
 std::vector<std::byte> repairedTiff(std::span<const std::byte> file) {

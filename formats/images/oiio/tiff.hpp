@@ -14,6 +14,10 @@ namespace stx::codecs {
 /// become such that it does not make them one too dark.
 [[nodiscard]] std::vector<std::byte> repairedTiff(std::span<const std::byte> file);
 
+/// Whether a TIFF of strips that was just written has its end: the directory, which is written
+/// last, and the last strip.
+[[nodiscard]] bool endsWhole(const char* path);
+
 /// Keeps the first error of libtiff while it lives, of any thread. One at a time.
 class TiffErrors {
   public:

@@ -8,8 +8,10 @@
 #include <span>
 
 #include "lib/base/parallel.hpp"
+#include "lib/geometry/pixel_space.hpp"
 #include "lib/model/peak_memory.hpp"
 #include "lib/refine/edge_colours.hpp"
+#include "lib/render/surface/plan/plan.hpp"
 #include "lib/render/surface/prepare/cells.hpp"
 #include "lib/render/surface/reach.hpp"
 
@@ -100,6 +102,7 @@ class Maker {
         : scene_(scene),
           used_(scene.sources.size()),
           reaches_(scene.sources.begin(), scene.sources.end()),
+          radius_(boundsOf(scene).radius()),
           onePlace_(onePlaceOf(scene)) {}
 
     /// Before surfaceOf() of any. Triangles are found again then: those of all views are many.
@@ -110,6 +113,7 @@ class Maker {
             for (int bx = 0; bx < s.blocksX; ++bx)
                 for (const Triangle& t : trianglesOf(s, bx, by))
                     for (const std::uint32_t corner : t.corners) used_[number][corner] = true;
+        for (const Leaf& leaf : s.leaves) useInside(s, leaf, used_[number]);
     }
 
     /// All triangles of a block of a view, without a choice among views.
@@ -202,8 +206,7 @@ class Maker {
             }
         }
         for (std::uint32_t pixel = 0; pixel < count; ++pixel) {
-            // Corners of leaves' insides are on no triangle, but on the leaf.
-            if (used[pixel] || !shows(s, pixel) || edgeDistance(s, pixel) > 0) continue;
+            if (used[pixel] || !shows(s, pixel)) continue;
             const glm::dvec3 world = worldOf(s, pixel);
             if (onSurfaceOfAnother(s, world)) continue;
             out.lonePixels.emplace_back(pixel % s.width, pixel / s.width);
@@ -215,6 +218,17 @@ class Maker {
     }
 
   private:
+    /// The pixels inside of a leaf are corners of no triangle, but lie on those of the leaf.
+    static void useInside(const Source& s, const Leaf& leaf, std::vector<bool>& used) {
+        bool some = false;
+        addLeaf(leaf, [&](int ax, int ay, int bx, int by, int cx, int cy) {
+            some = some || (shows(s, index(s, ax, ay)) && shows(s, index(s, bx, by)) &&
+                            shows(s, index(s, cx, cy)));
+        });
+        for (int y = leaf.y + 1; some && y < leaf.y + leaf.size; ++y)
+            for (int x = leaf.x + 1; x < leaf.x + leaf.size; ++x) used[index(s, x, y)] = true;
+    }
+
     /// Nothing is behind an edge in this cell, from wherever one looks: it is joined in spite of
     /// it.
     [[nodiscard]] bool openAt(const Source& s, int x, int y) const {
@@ -333,9 +347,10 @@ class Maker {
     [[nodiscard]] static bool shows(const Source& s, std::uint32_t pixel) {
         return s.whole->q.data()[pixel] > 0 && s.whole->texture->alpha(pixel) >= kLeastAlpha;
     }
-    [[nodiscard]] static bool sameDepth(const Source& s, std::uint32_t pixel, double dist) {
+    [[nodiscard]] bool sameDepth(const Source& s, std::uint32_t pixel, double dist) const {
         const double there = s.space.axis.dist(s.whole->q.data()[pixel]);
-        return std::abs(there - dist) <= kSameDepth * std::abs(dist) + kSameSteps * s.step;
+        const double shared = ShareLength(s.view->camera, radius_).at(std::abs(dist));
+        return std::abs(there - dist) <= kSameDepth * shared + kSameSteps * s.step;
     }
     /// The cell of four pixels has no edge in it.
     [[nodiscard]] static bool joined(const Source& s, int i, int j) {
@@ -463,22 +478,46 @@ class Maker {
                 const glm::dvec3 at =
                     c.project(glm::conjugate(c.orientation) * (place - c.position));
                 // What folds there for others is an outline that this view alone shows in full.
-                return anotherShows(others, place, normal, densityAt(s, place, normal, at),
+                return anotherShows(s, others, {place, normal, at},
                                     besideEdge(s, at) ? 0.0 : kAtCrease);
             });
     }
 
-    /// Some other view sees the place from the same side, more densely by kDenser.
-    [[nodiscard]] bool anotherShows(std::span<const Reach> others, glm::dvec3 world,
-                                    glm::dvec3 normal, double here, double atCrease) const {
-        for (const Reach& other : others) {
-            if (!other.holds(world)) continue;
-            const Camera& c = other.source().view->camera;
-            const glm::dvec3 ray = c.orthographic ? c.forward() : world - c.position;
-            if (!(glm::dot(ray, normal) < 0)) continue;
-            if (density(other.source(), world, normal, atCrease) > kDenser * here) return true;
+    /// A place of a view's surface.
+    struct SeenPlace {
+        glm::dvec3 world, normal;
+        glm::dvec3 at;  ///< in the view's picture
+    };
+    /// Some other view sees the place from the same side, more densely by kDenser; so by the slope
+    /// of that view's own surface, too: noise tilts both, and each would leave the place to the
+    /// other.
+    [[nodiscard]] bool anotherShows(const Source& s, std::span<const Reach> others,
+                                    const SeenPlace& place, double atCrease) const {
+        const double here = densityAt(s, place.world, place.normal, place.at);
+        for (const Reach& reach : others) {
+            if (!reach.holds(place.world)) continue;
+            const Source& other = reach.source();
+            const Camera& c = other.view->camera;
+            const glm::dvec3 ray = c.orthographic ? c.forward() : place.world - c.position;
+            if (!(glm::dot(ray, place.normal) < 0)) continue;
+            if (!(density(other, place.world, place.normal, atCrease) > kDenser * here)) continue;
+            const glm::dvec3 own = normalAt(other, place.world);
+            if (density(other, place.world, own, atCrease) >
+                kDenser * densityAt(s, place.world, own, place.at))
+                return true;
         }
         return false;
+    }
+
+    /// The normal of a view's own surface at a place that density() finds on it.
+    [[nodiscard]] glm::dvec3 normalAt(const Source& s, glm::dvec3 world) const {
+        const Camera& c = s.view->camera;
+        const glm::ivec2 cell =
+            cellOf(s, c.project(glm::conjugate(c.orientation) * (world - c.position)));
+        const glm::dvec3 corner = worldOf(s, index(s, cell.x, cell.y));
+        const glm::dvec3 across = glm::cross(worldOf(s, index(s, cell.x + 1, cell.y)) - corner,
+                                             worldOf(s, index(s, cell.x, cell.y + 1)) - corner);
+        return across / std::max(glm::length(across), std::numeric_limits<double>::min());
     }
 
     /// The place is on a triangle of some other view, or next to one.
@@ -499,8 +538,9 @@ class Maker {
     }
 
     const SurfaceScene& scene_;
-    std::vector<std::vector<bool>> used_;  ///< of each source: pixels that are corners
+    std::vector<std::vector<bool>> used_;  ///< of each source: pixels that lie on triangles
     std::vector<Reach> reaches_;           ///< of each source
+    double radius_;                        ///< of the scene
     OnePlace onePlace_;
 };
 

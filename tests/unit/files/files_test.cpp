@@ -330,6 +330,24 @@ TEST(OutputFile, TemporaryPathTakesWritesByName) {
     EXPECT_FALSE(fs::exists(gathered));
 }
 
+TEST(OutputFile, WhatIsGatheredForADeviceIsNotTakenForStale) {
+    const TemporaryFolder folder;
+    const int status = inChild([&] {
+        ::setenv("TMPDIR", folder.path().c_str(), 1);
+        auto null = OutputFile::create("/dev/null");
+        if (!null) return 1;
+        const fs::path gathered = null->temporaryPath();
+        put(gathered, "by name");
+        if (gathered.parent_path() != folder.path()) return 2;
+        // As another run does.
+        removeStaleTemporariesNow(folder.path());
+        if (!fs::exists(gathered)) return 3;
+        if (!null->commit()) return 4;
+        return fs::exists(gathered) ? 5 : 0;
+    });
+    EXPECT_EQ(status, 0);
+}
+
 TEST(OutputFolder, AppearsAtCommitOnly) {
     const TemporaryFolder folder;
     auto set = OutputFolder::create(folder / "set/", {});

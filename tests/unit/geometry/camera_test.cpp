@@ -115,5 +115,26 @@ TEST(RotationToUp, TakesTheFrontWithIt) {
               1e-12);
 }
 
+TEST(RotationToUp, TakesAnyLength) {
+    const glm::dvec3 up(0.3, -0.2, 0.7);
+    const auto expected = rotationToUp(up);
+    for (const double length : {0x1p-1000, 0x1p-600, 0x1p600, 0x1p1000})
+        EXPECT_EQ(rotationToUp(up * length), expected) << length;
+}
+
+TEST(Camera, LookAtTakesAnUpOfAnyLength) {
+    const glm::dvec3 up(0.3, -0.2, 0.7);
+    const auto expected = lookAt({5, 1, 2}, {0, 0, 0}, up);
+    ASSERT_TRUE(expected);
+    for (const double length : {0x1p-1000, 0x1p-600, 0x1p600, 0x1p1000}) {
+        const auto found = lookAt({5, 1, 2}, {0, 0, 0}, up * length);
+        ASSERT_TRUE(found) << length;
+        EXPECT_EQ(*found, *expected) << length;
+    }
+    const auto far = lookAt({5, 0, 0}, {0, 0, 0}, {0, 0, 1e170});
+    ASSERT_TRUE(far);
+    EXPECT_LT(glm::length(*far * glm::dvec3(0, 1, 0) - glm::dvec3(0, 0, 1)), 1e-12);
+}
+
 }  // namespace
 }  // namespace stx

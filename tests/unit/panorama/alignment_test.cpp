@@ -150,6 +150,22 @@ TEST(AlignPanorama, ClosesATurnOfPortraits) {
     EXPECT_GT(psnrOfPanorama(camera, found, 2048), 35);
 }
 
+TEST(AlignPanorama, ALoopThatStaysOpenEndsWithItsLastPicture) {
+    TurningCamera camera;
+    camera.sphere = &discs();
+    camera.size = {240, 320};
+    camera.lens = {2.0, -0.04 * 4};
+    // From the last to the first it is 15 degrees: they have the most in common.
+    for (int k = 0; k < 16; ++k) camera.add(23 * kDegree * k, 3 * kDegree, 0);
+    PanoramaSettings settings;
+    settings.closeLoop = false;
+    const auto found = mustAlign(camera, settings);
+    ASSERT_EQ(found.used(), 16);
+    EXPECT_FALSE(found.closed);
+    ASSERT_EQ(found.pairs.size(), 15u);
+    for (const PanoramaPair& pair : found.pairs) EXPECT_EQ(pair.b, pair.a + 1);
+}
+
 TEST(AlignPanorama, TakesCamerasThatAreRolled) {
     TurningCamera camera;
     camera.sphere = &discs();

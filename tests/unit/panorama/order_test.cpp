@@ -26,6 +26,22 @@ Pair pairWith(int a, int b, std::size_t matches) {
     return pair;
 }
 
+/// A camera that turned to the left by `yaw`, then up by `pitch`, and rolled; degrees.
+glm::dquat heldAt(double yaw, double pitch, double roll = 0) {
+    return glm::angleAxis(yaw * kDegree, glm::dvec3(0, 1, 0)) *
+           glm::angleAxis(pitch * kDegree, glm::dvec3(1, 0, 0)) *
+           glm::angleAxis(roll * kDegree, glm::dvec3(0, 0, 1));
+}
+
+/// Pictures that look up by 38 degrees, `step` degrees apart, and a last one near the zenith.
+TurnModel withZenith(int pictures, double step) {
+    TurnModel model = turnedBy(0, pictures + 1, {1, 0});
+    for (int k = 0; k < pictures; ++k)
+        model.worldFromCamera[static_cast<std::size_t>(k)] = heldAt(step * k, 38);
+    model.worldFromCamera.back() = heldAt(-100, 84);
+    return model;
+}
+
 }  // namespace
 
 TEST(PictureTree, IsTheLargestPartByTheStrongestPairs) {
@@ -78,6 +94,54 @@ TEST(PictureTree, OnlyPairsThatGoAllAroundClose) {
     EXPECT_NE(closing[0], 12) << "the short way";
 }
 
+TEST(PictureTree, ALoopThatStaysOpenIsCutBetweenTheLastAndTheFirst) {
+    // The last and the first have the most in common, and 5 and 6 the least.
+    const TurnModel truth = turnedBy(2 * M_PI / 12, 12, {1.3, 0});
+    auto pairs = neighbours(truth, true);
+    pairs.back().matches.resize(500);
+    pairs[5].matches.resize(10);
+    pairs.push_back(exactPair(truth, 0, 10));
+    pairs.back().matches.resize(300);
+    const PictureTree closed = treeOf(12, pairs), open = treeOf(12, pairs, false);
+    EXPECT_TRUE(closed.inTree[11] && closed.inTree[12] && !closed.inTree[5]);
+    EXPECT_TRUE(open.inTree[5] && !open.inTree[11] && !open.inTree[12]);
+    EXPECT_EQ(dropPairsThatClose(open, pairs, truth),
+              (std::vector<std::pair<int, int>>{{0, 10}, {0, 11}}));
+    ASSERT_EQ(pairs.size(), 11u);
+    for (const Pair& pair : pairs) EXPECT_EQ(pair.b, pair.a + 1);
+    // What is joined nowhere else is joined there.
+    pairs.erase(pairs.begin() + 5);
+    pairs.push_back(pairWith(0, 11, 8));
+    EXPECT_EQ(treeOf(12, pairs, false).order.size(), 12u);
+}
+
+TEST(PictureTree, APictureOfTheZenithDoesNotGoAllAround) {
+    // From it, pictures to both sides of what is behind it are near.
+    const TurnModel part = withZenith(6, 30);
+    auto pairs = neighbours(part, false);
+    for (int k = 0; k < 5; ++k) pairs.push_back(exactPair(part, k, 6));
+    EXPECT_TRUE(pairsThatClose(treeOf(7, pairs), pairs, part).empty());
+
+    // All are joined by it, and yet the ring below it closes once; one that stays open between the
+    // last and the first, whatever they have in common.
+    const TurnModel ring = withZenith(12, 30);
+    pairs.clear();
+    for (int k = 0; k < 11; ++k) pairs.push_back(exactPair(ring, k, k + 1));
+    pairs.push_back(exactPair(ring, 0, 11));
+    pairs.back().matches.resize(400);
+    for (int k = 0; k < 12; ++k) {
+        pairs.push_back(exactPair(ring, k, 12));
+        pairs.back().matches.resize(500);
+    }
+    PictureTree star = treeOf(13, pairs);
+    for (std::size_t p = 0; p < 12; ++p) ASSERT_FALSE(star.inTree[p]);
+    const auto closing = pairsThatClose(star, pairs, ring);
+    ASSERT_EQ(closing.size(), 1u);
+    EXPECT_LT(closing[0], 11);
+    star.closeLoop = false;
+    EXPECT_EQ(pairsThatClose(star, pairs, ring), std::vector{11});
+}
+
 TEST(PictureLevel, UpIsTheAxisOfTheTurnWhateverTheRolls) {
     // The world itself lies askew; some pictures are portraits, all are held by hand.
     const glm::dquat askew = glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, -1)));
@@ -90,6 +154,19 @@ TEST(PictureLevel, UpIsTheAxisOfTheTurnWhateverTheRolls) {
                                    glm::angleAxis(roll * kDegree, glm::dvec3(0, 0, 1));
     }
     EXPECT_GT(glm::dot(upOf(model), askew * glm::dvec3(0, 1, 0)), std::cos(0.5 * kDegree));
+}
+
+TEST(PictureLevel, UpIsTheAxisWhereAllLookSteeplyUpOrDown) {
+    const glm::dquat askew = glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, -1)));
+    for (const double pitch : {45.0, 50.0, 60.0, -50.0})
+        for (const double roll : {0.0, 90.0}) {
+            TurnModel model = turnedBy(0, 8, {1, 0});
+            for (int k = 0; k < 8; ++k)
+                model.worldFromCamera[static_cast<std::size_t>(k)] =
+                    askew * heldAt(45 * k, pitch, roll + (k % 2 == 0 ? 0.3 : -0.3));
+            EXPECT_GT(glm::dot(upOf(model), askew * glm::dvec3(0, 1, 0)), std::cos(0.5 * kDegree))
+                << pitch << " " << roll;
+        }
 }
 
 TEST(PictureLevel, TheMiddleOfWhatIsSeenLiesAhead) {
@@ -106,6 +183,22 @@ TEST(PictureLevel, TheMiddleOfWhatIsSeenLiesAhead) {
     EXPECT_LT(ahead(2, false).x, -0.4) << "a turn to the left is to the left";
     EXPECT_LT(glm::distance(ahead(0, true), glm::dvec3(0, 0, -1)), 1e-9)
         << "a turn that closes begins with its first picture";
+}
+
+TEST(PictureLevel, APictureOfTheZenithDoesNotMoveTheMiddle) {
+    TurnModel model = withZenith(6, 30);
+    const glm::dvec3 up(0, 1, 0);
+    const auto yawAhead = [&](bool closed) {
+        const glm::dvec3 middle = glm::inverse(levelTurn(model, up, closed)) * glm::dvec3(0, 0, -1);
+        return std::atan2(-middle.x, -middle.z) / kDegree;
+    };
+    EXPECT_NEAR(yawAhead(false), 75, 1e-6);
+    // Nor is it what a closed turn begins with.
+    std::swap(model.worldFromCamera.front(), model.worldFromCamera.back());
+    EXPECT_NEAR(yawAhead(true), 30, 1e-6);
+    // By itself it counts.
+    for (std::size_t k = 1; k < 7; ++k) model.known[k] = false;
+    EXPECT_NEAR(yawAhead(false), -100, 1e-6);
 }
 
 }  // namespace stx::panorama

@@ -51,4 +51,38 @@ TEST(PicturePatches, AreMovedToATwentiethOfAPixel) {
               matches.size() / 10);
 }
 
+// What is wrong here an address sanitizer sees: patches that a wide lens bends reached out of the
+// picture by some pixels.
+TEST(PicturePatches, StayInPicturesOfAWideLens) {
+    const PanoramaImage sphere{texturedSphere(512)};
+    TurningCamera camera;
+    camera.sphere = &sphere;
+    camera.size = {128, 128};
+    constexpr double kDegrees = M_PI / 180;
+    camera.lens = {std::sqrt(0.5) / std::tan(75 * kDegrees), 0};  // 150 degrees
+    for (int k = 0; k < 3; ++k) camera.add(14 * kDegrees * k, 8 * kDegrees * k, 0);
+    std::vector<WorkCopy> copies;
+    std::vector<Pyramid> pyramids;
+    std::vector<Features> features(3);
+    for (int k = 0; k < 3; ++k) {
+        copies.push_back(makeWorkCopy(*camera.picture(k), 1000));
+        pyramids.push_back(pyramidOf(copies.back().grey));
+        // Everywhere, so that some are where it matters.
+        for (int y = 2; y < 128; y += 4)
+            for (int x = 2; x < 128; x += 4)
+                features[static_cast<std::size_t>(k)].points.push_back({.pixel = {x, y}});
+    }
+    TurnModel model;
+    model.worldFromCamera = camera.worldFromCamera;
+    model.known = {true, true, true};
+    model.lens = camera.lens;
+    PatchSettings settings;
+    settings.most = 10000;  // all that there are
+    for (int a = 0; a < 3; ++a)
+        for (int b = a + 1; b < 3; ++b)
+            for (const Match& m : alignPatches(copies, pyramids, features, model, a, b, settings))
+                for (const glm::dvec2 p : {m.a, m.b})
+                    EXPECT_LT(std::max(std::abs(p.x), std::abs(p.y)), std::sqrt(0.5));
+}
+
 }  // namespace stx::panorama

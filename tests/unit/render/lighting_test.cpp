@@ -36,6 +36,18 @@ TEST(Lighting, OnlyTheDirectionOfADirectionalLightCounts) {
     }
 }
 
+TEST(Lighting, APointLightShinesFromAnyDistance) {
+    for (const float distance : {1e3f, 1e14f, 1e16f, 1e20f, 3e38f}) {
+        for (const bool inCameraSpace : {false, true}) {
+            Lighting lighting = oneLight(0.5f);
+            lighting.lights[0] = {
+                Light::Kind::point, {0, 0, distance}, glm::vec3(0.5f), inCameraSpace};
+            EXPECT_FLOAT_EQ(lit(lightsInWorld(lighting, glm::dmat4(1.0)), 0.6f, true).x, 0.3f)
+                << distance;
+        }
+    }
+}
+
 TEST(Lighting, FullLightLeavesACodedColourAsItIs) {
     for (const float coded : {0.0f, 0.003f, 0.1f, 0.5f, 1.0f})
         EXPECT_NEAR(lit(oneLight(1.0f), coded, false).x, coded, 1e-4f) << coded;

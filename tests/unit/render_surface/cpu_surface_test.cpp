@@ -566,5 +566,20 @@ TEST(CpuSurface, CoarseDepthCodesStillGiveAClosedSurface) {
         for (int x = 60; x < 100; ++x) ASSERT_GT(frame.colour.at(x, y).a, 0.99f) << x << "," << y;
 }
 
+// Pieces of a surface that reach behind the plane of an orthographic camera end there.
+TEST(CpuSurface, AnOrthographicCameraAmidAPlaneSeesWhatIsBeforeIt) {
+    const Scene floor = [](glm::dvec3 from, glm::dvec3 along) {
+        return plane(
+            0.0, [](double, double) { return true; }, from, along);
+    };
+    const Bundle bundle = bundleOf(floor, {at({0, 0, 2.2}, {0, 0.001, 0}, 96, 0.9273)});
+    const glm::dvec3 eye(0, 0, 0.001);
+    const Camera camera =
+        Camera::fromFieldOfView(eye, *lookAt(eye, {0, 1, -1}, {0, 0, 1}), {1.5, 1.5}, true, 96, 96);
+    const Frame frame = draw(bundle, camera, with(Quality::normal, Fill::none));
+    for (int y = 0; y < 47; ++y) EXPECT_GT(frame.colour.at(48, y).a, 0.5f) << y;
+    for (int y = 49; y < 96; ++y) EXPECT_EQ(frame.colour.at(48, y).a, 0.0f) << y;
+}
+
 }  // namespace
 }  // namespace stx

@@ -121,6 +121,7 @@ HWY_INLINE void fillPolygon(const Target& t, const Filling& f, int l) {
     const int n = static_cast<int>(hn::Lanes(d));
     const Floats steps = hn::ConvertTo(d, hn::Iota(hn::RebindToSigned<FloatTag>(), 0));
     const Floats low = hn::Set(d, f.low[l]), high = hn::Set(d, f.high[l]), zero = hn::Zero(d);
+    const Floats limit = hn::Set(d, t.qLimit);
     const Floats tag = hn::BitCast(d, hn::Set(du, f.flags[l]));
     const Floats clean = hn::BitCast(d, hn::Set(du, ~std::uint32_t{kSampleFlags}));
     const int x0 = static_cast<int>(f.x0[l]), x1 = static_cast<int>(f.x1[l]);
@@ -140,6 +141,7 @@ HWY_INLINE void fillPolygon(const Target& t, const Filling& f, int l) {
             FloatMask mask = hn::And(hn::Ge(inside, zero), inColumns);
             Floats q = hn::MulAdd(hn::Set(d, f.py[l]), vy, plane);
             q = hn::Min(hn::Max(q, low), high);
+            mask = hn::And(mask, hn::Le(q, limit));
             q = hn::Or(hn::And(q, clean), tag);
             float* out = t.samples + static_cast<std::ptrdiff_t>(y) * t.stride + x;
             const Floats old = hn::LoadU(d, out);
@@ -233,10 +235,10 @@ HWY_INLINE void drawSmall(const Target& t, const Planes& f, FloatMask small) {
             const Floats inside = hn::MulAdd(f.ex[i], x, hn::MulAdd(f.ey[i], y, f.e0[i]));
             here = hn::And(here, hn::Ge(inside, zero));
         }
-        std::uint32_t left = bitsOf(here);
-        if (!left) continue;
         Floats q = hn::MulAdd(f.px, x, hn::MulAdd(f.py, y, f.p0));
         q = hn::Min(hn::Max(q, f.low), f.high);
+        std::uint32_t left = bitsOf(hn::And(here, hn::Le(q, hn::Set(d, t.qLimit))));
+        if (!left) continue;
         hn::Store(hn::Or(hn::And(q, clean), hn::BitCast(d, f.flags)), d, values);
         const auto place = hn::MulAdd(y, hn::Set(d, static_cast<float>(t.stride)), x);
         hn::Store(hn::ConvertTo(di, place), di, places);
@@ -288,7 +290,7 @@ HWY_INLINE void drawPolygons(Target& t, const Polygons& p, Extent& extent) {
     const Diagonals diagonals(p);
     const Floats area = diagonals.area();
     FloatMask mask = hn::And(hn::And(p.there, hn::Gt(area, zero)),
-                             hn::And(hn::Gt(f.low, zero), hn::Le(f.high, hn::Set(d, t.qLimit))));
+                             hn::And(hn::Gt(f.low, zero), hn::Le(f.low, hn::Set(d, t.qLimit))));
     mask = hn::And(mask, hn::And(hn::Le(fx0, fx1), hn::Le(fy0, fy1)));
     if (hn::AllFalse(d, mask)) return;
     extent.add(mask, fx0, fy0, fx1, fy1);

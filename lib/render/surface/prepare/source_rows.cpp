@@ -96,7 +96,8 @@ struct Linker {
         const VF perUnit = axis.inverse ? hn::Mul(nearer, nearer) : hn::Set(d, axis.qPerUnit(1.0f));
         const MF small = hn::Lt(size, hn::Add(hn::Mul(hn::Set(d, kLinkAlways), scale),
                                               hn::Mul(hn::Set(d, kLinkSteps * step), perUnit)));
-        const float never = std::max(kLinkNever, kLinkSteepest * axis.pixelShare());
+        const float never = std::max(kLinkNever * std::min(1.0f, static_cast<float>(axis.coarse)),
+                                     kLinkSteepest * axis.pixelShare());
         const MF possible =
             hn::Lt(size, axis.inverse ? hn::Mul(nearer, hn::Set(d, never)) : hn::Set(d, never));
         const VF agree = hn::Mul(hn::Set(d, kSameSlope), size);
