@@ -56,6 +56,10 @@ struct Triangle {
     std::array<std::uint32_t, 3> corners;
 };
 
+/// The share of a distance that tells surfaces apart is one of so many times what the picture shows
+/// there: of views below 28 degrees. 1.2 are an orthographic camera's (pixel_space.cpp).
+constexpr double kWindows = 2.0;
+
 /// How far an eye goes to the side of a photograph, of the median distance: as behindPhoto() has it
 /// unless another distance is asked for.
 constexpr double kEyeAside = 0.08;
@@ -349,7 +353,12 @@ class Maker {
     }
     [[nodiscard]] bool sameDepth(const Source& s, std::uint32_t pixel, double dist) const {
         const double there = s.space.axis.dist(s.whole->q.data()[pixel]);
-        const double shared = ShareLength(s.view->camera, radius_).at(std::abs(dist));
+        const Camera& c = s.view->camera;
+        double shared = ShareLength(c, radius_).at(std::abs(dist));
+        // A telephoto camera tells depths apart as an orthographic one with such a window does.
+        if (!c.orthographic)
+            shared = std::min(
+                shared, kWindows * std::max(c.width / c.fx, c.height / c.fy) * std::abs(dist));
         return std::abs(there - dist) <= kSameDepth * shared + kSameSteps * s.step;
     }
     /// The cell of four pixels has no edge in it.
