@@ -16,9 +16,10 @@ Result<Bundle> viewsToDraw(
     const std::function<Result<void>(std::size_t, const ReferenceView&)>& look) {
     const DrawingMemory takes(table, drawing, wanted);
     const bool fits = takes.inMemory() <= job.limits.maxMemoryBytes;
-    if (takes.inSpool(job.limits) && (!fits || FileSpool::costsLittle(folder, takes.inMemory()))) {
+    if (takes.inSpool(job.limits) && (!fits || FileSpool::costsLittle(folder))) {
         STX_CHECK(checkDrawing(table, drawing, wanted, job.limits));
-        auto made = FileSpool::create(folder, takes.spoolHolds(job.limits));
+        auto made =
+            FileSpool::create(folder, takes.spoolHolds(job.limits), fits ? takes.inMemory() : 0);
         if (!made && !fits) return propagate(made);
         if (made) spool = std::move(*made);
     } else {

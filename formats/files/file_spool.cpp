@@ -141,7 +141,7 @@ struct FileSpool::File {
 };
 
 Result<std::unique_ptr<FileSpool>> FileSpool::create(const std::filesystem::path& folder,
-                                                     std::uint64_t budget) {
+                                                     std::uint64_t budget, std::uint64_t room) {
     auto made = createTemporaryFile(folder);
     if (!made)
         return fail(ErrorCode::io, "cannot make a file in '{}': {}", folder.string(),
@@ -151,16 +151,22 @@ Result<std::unique_ptr<FileSpool>> FileSpool::create(const std::filesystem::path
     auto file = std::make_unique<File>();
     file->folder = folder;
     file->file = std::move(made->fd);
+    // Quotas and limits of the process tell only so.
+    if (room > 0) {
+        const int error = ::posix_fallocate(file->file.get(), 0, static_cast<off_t>(room));
+        if (error != 0)
+            return fail(ErrorCode::io, "{}: {}", file->noRoom(),
+                        std::generic_category().message(error));
+    }
     file->statm = Descriptor(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
     file->budget = budget;
     file->others = mappedBytes(file->statm.get());
     return std::unique_ptr<FileSpool>(new FileSpool(std::move(file)));
 }
 
-bool FileSpool::costsLittle(const std::filesystem::path& folder, std::uint64_t bytes) noexcept {
+bool FileSpool::costsLittle(const std::filesystem::path& folder) noexcept {
     struct statfs disk {};
     if (::statfs(folder.c_str(), &disk) != 0) return false;
-    if (disk.f_bavail < bytes / static_cast<std::uint64_t>(disk.f_bsize)) return false;
     switch (static_cast<std::uint32_t>(disk.f_type)) {
         case EXT4_SUPER_MAGIC:
         case XFS_SUPER_MAGIC:

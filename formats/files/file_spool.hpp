@@ -15,13 +15,13 @@ namespace stx {
 /// memory than that, however many there are. The file is as large as what is kept at a time.
 class FileSpool final : public PixelSpool {
   public:
-    /// `budget`: bytes. Errors (io): no file can be made in `folder`.
+    /// `budget`: bytes in memory. `room`: bytes of the file that must be free on the disk, taken at
+    /// once. Errors (io): no file can be made in `folder`, or it has no such room.
     [[nodiscard]] static Result<std::unique_ptr<FileSpool>> create(
-        const std::filesystem::path& folder, std::uint64_t budget);
-    /// Whether a file of so many bytes in `folder` costs little: it is on a disk of this machine
-    /// that has room for it, and not in memory or on another machine.
-    [[nodiscard]] static bool costsLittle(const std::filesystem::path& folder,
-                                          std::uint64_t bytes) noexcept;
+        const std::filesystem::path& folder, std::uint64_t budget, std::uint64_t room = 0);
+    /// Whether a file in `folder` costs little: it is on a disk of this machine, and not in memory
+    /// or on another machine.
+    [[nodiscard]] static bool costsLittle(const std::filesystem::path& folder) noexcept;
     ~FileSpool() override;
 
     /// Where the file cannot grow, on a full disk, the error is a std::system_error.

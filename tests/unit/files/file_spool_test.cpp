@@ -47,9 +47,10 @@ TEST(FileSpool, PixelsStayWhatTheyAre) {
 
 TEST(FileSpool, CostsLittleOnADiskWithRoom) {
     const TemporaryFolder folder;
-    EXPECT_FALSE(FileSpool::costsLittle(folder.path(), std::uint64_t{1} << 60));
-    EXPECT_FALSE(FileSpool::costsLittle(folder / "not there", 1));
-    EXPECT_FALSE(FileSpool::costsLittle("/dev/shm", 1)) << "in memory, or not there";
+    EXPECT_TRUE(FileSpool::create(folder.path(), 0, 1 << 20));
+    EXPECT_FALSE(FileSpool::create(folder.path(), 0, std::uint64_t{1} << 60)) << "it is full";
+    EXPECT_FALSE(FileSpool::costsLittle(folder / "not there"));
+    EXPECT_FALSE(FileSpool::costsLittle("/dev/shm")) << "in memory, or not there";
 }
 
 TEST(FileSpool, ServesManyThreads) {
