@@ -1,3 +1,6 @@
+#include <atomic>
+#include <utility>
+
 #include <nlohmann/json.hpp>
 
 #include "formats/any/open.hpp"
@@ -30,14 +33,28 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
     settings.method =
         o.method == "paper" ? BakeSettings::Method::paper : BakeSettings::Method::robust;
     const Timeline timeline = frames->timeline();
-    STX_TRY(const auto change,
+    STX_TRY(auto change,
             bakeOfViews(settings, container == FileKind::mpeg4 ? peak::kBakeToMpeg4 : peak::kBake));
+    std::atomic<bool> normals = false, ofMesh = false;
+    change.change = [&normals, &ofMesh, bakes = std::exchange(change.change, {})](
+                        ReferenceView& view, Job& job) -> Result<void> {
+        if (view.hasNormals()) normals = true;
+        // Those of a bake come with splat axes, and are of the depth already.
+        if (view.hasNormals() && !view.hasSplats()) ofMesh = true;
+        return bakes(view, job);
+    };
     keepFreedMemory();  // of a view, for the next one
     ViewTally tally;
     frames = tallied(changedByView(std::move(frames), change), tally);
     SaveOptions save;
     save.noClobber = program.common.noClobber;
     STX_CHECK(saveSequence(*frames, o.output, save, program.job));
+    if (ofMesh && !settings.keepNormals)
+        program.job.note(
+            "the normals that views had are replaced by those of their depth; --keep-normals keeps "
+            "them");
+    if (!normals && settings.keepNormals)
+        program.job.note("the views have no normals; --keep-normals has nothing to keep");
     const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format(
@@ -75,6 +92,8 @@ void addBake(CommandLine& line, Program& program) {
     c.option("--discontinuity", o->settings.discontinuity,
              "Relative depth difference beyond the slope that parts two surfaces (default 0.01)")
         .range(1e-6, 1.0);
+    c.flag("--keep-normals", o->settings.keepNormals,
+           "Views that have normals keep them, as those of a mesh (stx convert --normals mesh)");
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o](Program& p) { return bakeBundle(*o, p); });

@@ -190,6 +190,7 @@ Result<Extracted> extractPly(const ExtractOptions& o, const PeakMemory& takes, S
     const bool normals = std::ranges::all_of(table->kinds(), &ViewImageKinds::normal);
     const glm::dvec3 origin = std::as_const(*table).about().origin;
     noteEnvironmentLeftOut(std::as_const(*table).about().environment, program.job);
+    noteMaterialLeftOut(*table, program.job);
     keepFreedMemory();  // of a view, for the next one
     STX_TRY(const std::size_t count, countPoints(*table, program.job));
     STX_TRY(auto file, PlyInParts::create(o.output, {count, normals, true, false, origin},
@@ -218,6 +219,7 @@ Result<Extracted> extractPoints(const ExtractOptions& o, const PeakMemory& takes
     STX_TRY(const auto bundle, frames.frame(moment, program.job));
     STX_CHECK(checkPeak(takes, bundle.views, program.job.limits));
     noteEnvironmentLeftOut(bundle.environment, program.job);
+    bundle.noteMaterialLeftOut(program.job);
     const bool normals = std::ranges::all_of(bundle.views, &ReferenceView::hasNormals);
     Points found;
     for (const ReferenceView& view : bundle.views) found.add(view, normals);

@@ -12,6 +12,7 @@
 #include "lib/base/stopwatch.hpp"
 #include "lib/model/from_origin.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/model/view_table.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
 #include "tools/camera_options.hpp"
@@ -175,6 +176,7 @@ Result<int> extractPicture(const std::string& input, const OpenOptions& open,
             momentOf(time, frames->timeline(), "a picture is", input, program.job));
     STX_TRY(const auto table, frames->views(moment, program.job));
     noteEnvironmentLeftOut(std::as_const(*table).about().environment, program.job);
+    noteMaterialLeftOut(*table, program.job);
     STX_TRY(const std::size_t number, namedView(view, std::as_const(*table).about().views));
     const std::uint64_t pixels = table->pixelsOf(number);
     STX_CHECK(checkPeak(peak::kExport, pixels, pixels,

@@ -16,6 +16,7 @@
 #include "lib/base/stopwatch.hpp"
 #include "lib/model/from_origin.hpp"
 #include "lib/model/translucent.hpp"
+#include "lib/model/view_table.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/refining.hpp"
 #include "tools/view_tally.hpp"
@@ -104,6 +105,7 @@ Result<int> extractSplats(const std::string& input, const OpenOptions& open,
         if (i == first) {
             views = table->count();
             noteEnvironmentLeftOut(std::as_const(*table).about().environment, program.job);
+            noteMaterialLeftOut(*table, program.job);
             table = watchedViews(std::move(table), [&](auto k, auto& view) {
                 tally.add(k, view);
                 if (hasTranslucentInside(view.texture, view.depth)) translucent = true;

@@ -550,6 +550,8 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
                 "found '{}', expected '{} X Y Z': vertices are as Assimp takes them, their "
                 "coordinates rounded to 32-bit floats",
                 plain.unread.substr(0, 60), format == AssimpFormat::obj ? "v" : "vertex"));
+        if (plain.dropsAlpha)
+            files.job().note("the alpha of vertex colours (v X Y Z R G B A) is not used");
         noteNotRead(collada, files.job());
         return SceneConverter(scene, format, files, side, plain, std::move(faces.bareMaterials))
             .convert();

@@ -87,6 +87,17 @@ constexpr std::pair<std::vector<glm::vec2> MeshPart::*, std::vector<glm::vec2> M
      {&MeshPart::metallicRoughnessUvs, &Mesh::metallicRoughnessUvs},
      {&MeshPart::emissiveUvs, &Mesh::emissiveUvs}};
 
+/// giveFaceNormals() of a part: copies have all that their vertex has.
+template <class Missing>
+void giveFaceNormals(MeshPart& part, const Missing& missing) {
+    giveFaceNormals(part.positions, part.triangles, part.normals, missing, [&](std::uint32_t v) {
+        copyVertex(part.tangents, v);
+        copyVertex(part.colours, v);
+        copyVertex(part.uvs, v);
+        for (const auto& [own, _] : kOwnUvs) copyVertex(part.*own, v);
+    });
+}
+
 }  // namespace
 
 Result<void> MeshBuilder::charge(std::uint64_t count, std::uint64_t bytesEach,
@@ -238,12 +249,9 @@ void MeshBuilder::repair(MeshPart& part) {
     if (brokenNormals == part.normals.size()) {
         part.normals.clear();
     } else if (brokenNormals > 0) {
-        for (const auto& t : part.triangles) {
-            const auto face = glm::normalize(areaNormal(part.positions, t));
-            for (int k = 0; k < 3; ++k) {
-                if (part.normals[t[k]] == kNoNormal) part.normals[t[k]] = glm::vec3(face);
-            }
-        }
+        std::vector<bool> given(part.normals.size());
+        for (std::size_t i = 0; i < given.size(); ++i) given[i] = part.normals[i] != kNoNormal;
+        giveFaceNormals(part, [&](std::uint32_t v) { return v >= given.size() || !given[v]; });
     }
     if (brokenNormals > 0 && (part.points || !part.triangles.empty()))
         job_.note(fmt::format(
@@ -417,14 +425,7 @@ void keepVertices(MeshPart& part, const std::vector<bool>& kept) {
 
 void addFlatNormals(MeshPart& part) {
     part.normals.assign(part.positions.size(), kNoNormal);
-    giveFaceNormals(
-        part.positions, part.triangles, part.normals, [](std::uint32_t) { return true; },
-        [&](std::uint32_t v) {
-            copyVertex(part.tangents, v);
-            copyVertex(part.colours, v);
-            copyVertex(part.uvs, v);
-            for (const auto& [own, _] : kOwnUvs) copyVertex(part.*own, v);
-        });
+    giveFaceNormals(part, [](std::uint32_t) { return true; });
 }
 
 namespace {

@@ -19,6 +19,7 @@ struct CoordinateLine {
     glm::dvec3 position{0.0};
     std::string_view rest;
     std::optional<glm::vec3> colour;  ///< the rest is r g b
+    std::optional<double> alpha;      ///< was behind them, and is not in the rest
 };
 
 /// What doubles cannot hold is 0 or infinite, as Assimp has it.
@@ -37,7 +38,7 @@ bool takeNumber(std::string_view& text, double& value) {
     return text.empty() || isBlank(text.front());
 }
 
-/// `values` is what follows the keyword. OBJ: x y z, x y z w, or x y z r g b.
+/// `values` is what follows the keyword. OBJ: x y z, x y z w, x y z r g b, or x y z r g b a.
 std::optional<CoordinateLine> parse(std::string_view values) {
     CoordinateLine line;
     values = trimmed(values);
@@ -53,8 +54,14 @@ std::optional<CoordinateLine> parse(std::string_view values) {
     }
     double colour[3] = {};
     auto numbers = line.rest;
-    if (std::ranges::all_of(colour, [&](double& c) { return takeNumber(numbers, c); }))
-        line.colour = glm::vec3(colour[0], colour[1], colour[2]);
+    if (!std::ranges::all_of(colour, [&](double& c) { return takeNumber(numbers, c); }))
+        return line;
+    line.colour = glm::vec3(colour[0], colour[1], colour[2]);
+    const auto rgb = line.rest.substr(0, line.rest.size() - numbers.size());
+    if (double alpha = 1; takeNumber(numbers, alpha) && trimmed(numbers).empty()) {
+        line.alpha = alpha;
+        line.rest = rgb;
+    }
     return line;
 }
 
@@ -137,7 +144,7 @@ PlainText plainCoordinates(ByteSpan bytes, std::string_view keyword) {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     PlainText out;
     std::vector<glm::dvec3> positions;  // that are a place
-    std::size_t vertices = 0, coloured = 0;
+    std::size_t vertices = 0, coloured = 0, withAlpha = 0, notOne = 0, notByte = 0;
     ColourRange range;
     eachLine(text, keyword, [&](std::string_view whole, const auto& values) {
         if (!values) return true;
@@ -153,15 +160,20 @@ PlainText plainCoordinates(ByteSpan bytes, std::string_view keyword) {
         if (!line->colour) return true;
         ++coloured;
         range.add(*line->colour);
+        if (!line->alpha) return true;
+        ++withAlpha;
+        notOne += *line->alpha == 1 ? 0 : 1;
+        notByte += *line->alpha == 255 ? 0 : 1;
         return true;
     });
     if (!out.unread.empty()) return out;
+    out.dropsAlpha = (range.isBytes() ? notByte : notOne) > 0;
     const auto strays = findStrays(positions.size(), [&](std::uint64_t i) {
         return Piece{positions[i], positions[i]};
     });
     out.origin = originFor(strays.bounds);
     const bool mixed = coloured > 0 && coloured < vertices;
-    if (out.origin == glm::dvec3(0.0) && !mixed) return out;
+    if (out.origin == glm::dvec3(0.0) && !mixed && withAlpha == 0) return out;
     const std::string_view white = range.isBytes() ? "255 255 255" : "1 1 1";
     auto& plain = out.text.emplace();
     plain.reserve(text.size() + vertices * 8);

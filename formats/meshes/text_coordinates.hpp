@@ -15,6 +15,7 @@ struct PlainText {
     std::optional<Bytes> text;  ///< nothing where all is fine as it is
     glm::dvec3 origin{0.0};     ///< is subtracted from the coordinates
     std::string unread;         ///< the first line that is not understood: all stays as it is
+    bool dropsAlpha = false;    ///< the text is without alphas of vertices, some below full
 };
 
 /// OBJ text as Assimp reads what it means; nothing when it is so already:
@@ -33,6 +34,7 @@ struct PlainText {
 ///    them too large.
 ///  - It gives the k-th colour to the k-th vertex, also where vertices before it have none. So
 ///    vertices without a colour become white when others have one.
+///  - It takes three, four or six numbers. So the alpha behind a colour is left out.
 /// Vertices that are at no finite place stay so, and have no say in this.
 [[nodiscard]] PlainText plainCoordinates(ByteSpan text, std::string_view keyword);
 

@@ -87,9 +87,7 @@ Result<std::vector<Camera>> orbitCameras(glm::dvec3 centre, double radius,
         const glm::dvec3 direction =
             toUp * glm::dvec3(std::sin(a) * std::cos(e), std::sin(e), std::cos(a) * std::cos(e));
         CameraSettings turned = s;
-        // From straight above `up` is a point: what lies away from the viewer is up, as just below.
-        if (std::abs(std::cos(e)) < 1e-9)
-            turned.up = toUp * (-std::sin(e) * glm::dvec3(std::sin(a), 0, std::cos(a)));
+        if (const auto up = upAtPole(a, e)) turned.up = toUp * *up;
         STX_TRY(const auto camera, cameraAt(centre + direction * distance, centre, turned));
         cameras.push_back(camera);
     }

@@ -272,12 +272,15 @@ Error blindError(const std::vector<Camera>& cameras, const std::vector<Sight>& s
                 "see them, so that no view has depth; stx render draws such a cloud, and views "
                 "need one that is denser or more opaque",
                 {}};
-    const auto tooSmall = [](const Camera& c) { return std::max(c.width, c.height) < 16; };
+    // Pixels of the narrower side, which leave twelve to the object (ViewFraming::marginPixels):
+    // what sees nothing then has another reason.
+    constexpr int kLeastSide = 16;
+    const auto tooSmall = [](const Camera& c) { return std::min(c.width, c.height) < kLeastSide; };
     if (std::ranges::all_of(cameras, tooSmall))
         return {ErrorCode::invalidInput,
                 fmt::format("no pixel of the views meets the model: {}x{} pixels are too few; take "
-                            "16x16 or more",
-                            cameras[0].width, cameras[0].height),
+                            "{}x{} or more",
+                            cameras[0].width, cameras[0].height, kLeastSide, kLeastSide),
                 {}};
     return {ErrorCode::invalidInput,
             fmt::format("{} the model; check the poses and units",

@@ -14,6 +14,11 @@ bool isGrid(ViewLayout::Kind kind) {
     return kind == ViewLayout::Kind::octahedral || kind == ViewLayout::Kind::hemiOctahedral;
 }
 
+/// Where the i-th of n cameras of a ring is, radians.
+double ringAngle(int i, int n) {
+    return 2.0 * std::numbers::pi * i / n;
+}
+
 }  // namespace
 
 Result<ViewLayout> parseViewLayout(std::string_view text) {
@@ -119,6 +124,13 @@ glm::dvec3 upOfCameras(const std::vector<Camera>& cameras) {
     return {0, 1, 0};
 }
 
+std::optional<glm::dvec3> upAtPole(double aroundRad, double elevationRad) {
+    // The cosine of a right angle, rounded; lookAt() takes as little for no `up` at all.
+    constexpr double kRounding = 1e-9;
+    if (std::abs(std::cos(elevationRad)) >= kRounding) return std::nullopt;
+    return -std::sin(elevationRad) * glm::dvec3(std::sin(aroundRad), 0, std::cos(aroundRad));
+}
+
 std::vector<glm::dvec3> layoutDirections(const ViewLayout& layout) {
     std::vector<glm::dvec3> out;
     const int n = layout.count;
@@ -127,7 +139,7 @@ std::vector<glm::dvec3> layoutDirections(const ViewLayout& layout) {
             return {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
         case ViewLayout::Kind::ring:
             for (int i = 0; i < n; ++i) {
-                const double a = 2.0 * std::numbers::pi * i / n, e = layout.elevationRad;
+                const double a = ringAngle(i, n), e = layout.elevationRad;
                 out.emplace_back(std::sin(a) * std::cos(e), std::sin(e), std::cos(a) * std::cos(e));
             }
             break;
@@ -213,14 +225,19 @@ Result<std::vector<Camera>> layoutCameras(const ViewLayout& layout, const ViewFr
         return fail(ErrorCode::usage, "up is 0,0,0; it must point somewhere");
     auto directions = layoutDirections(layout);
     // The faces of a cube are those of the axes, whichever is up.
-    if (framing.up != glm::dvec3(0, 1, 0) && layout.kind != ViewLayout::Kind::cube) {
-        const glm::dquat toUp = rotationToUp(framing.up);
+    const bool turned = framing.up != glm::dvec3(0, 1, 0) && layout.kind != ViewLayout::Kind::cube;
+    const glm::dquat toUp = turned ? rotationToUp(framing.up) : glm::dquat(1, 0, 0, 0);
+    if (turned)
         for (auto& d : directions) d = toUp * d;
-    }
     const bool tight = !isGrid(layout.kind);
     std::vector<Camera> cameras(directions.size());
     STX_CHECK(parallelTry(0, directions.size(), [&](std::size_t i) -> Result<void> {
-        STX_TRY(cameras[i], frameCamera(directions[i], framing, points, sphere, tight));
+        ViewFraming own = framing;
+        if (layout.kind == ViewLayout::Kind::ring)
+            if (const auto up =
+                    upAtPole(ringAngle(static_cast<int>(i), layout.count), layout.elevationRad))
+                own.up = toUp * *up;
+        STX_TRY(cameras[i], frameCamera(directions[i], own, points, sphere, tight));
         return {};
     }));
     return cameras;

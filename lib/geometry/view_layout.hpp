@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -54,6 +55,12 @@ struct ViewFraming {
 /// The coordinate axis along which cameras stand upright: none is tilted sideways against it by
 /// more than some degrees. +Y when it is one of these, or when none is.
 [[nodiscard]] glm::dvec3 upOfCameras(const std::vector<Camera>& cameras);
+
+/// What is up in the picture of a camera on a ring around an object whose up is +Y, which is a
+/// point in the picture from straight above or below: what lies away from the viewer is up there,
+/// as just beside, so that pictures turn with `aroundRad` (from +Z, counter-clockwise from above).
+/// Nothing elsewhere, where the object's up serves.
+[[nodiscard]] std::optional<glm::dvec3> upAtPole(double aroundRad, double elevationRad);
 
 /// Unit vectors from the object towards the cameras, in order, of an object whose up is +Y.
 [[nodiscard]] std::vector<glm::dvec3> layoutDirections(const ViewLayout& layout);

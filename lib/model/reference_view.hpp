@@ -118,15 +118,17 @@ struct ReferenceView : ViewHeader {
     Texture texture;     ///< colour with coverage in alpha
     Image<float> depth;  ///< planar distance in scene units; kNoDepth where there is no point
 
-    /// SimpleTextureV2. Empty when absent; else one value per pixel, zero where there is no point.
-    /// Unit, in the world, towards the camera, but for those of bent or mapped surfaces that a mesh
-    /// has at rims and steep bumps.
+    /// SimpleTextureV2. Empty when absent; else one value per pixel, zero where there is no point,
+    /// but for pruned pixels beside kept ones, which keep their normal (keepOnly()). Unit, in the
+    /// world, towards the camera, but for those of bent or mapped surfaces that a mesh has at rims
+    /// and steep bumps.
     Image<glm::vec3> normal;
     Image<glm::vec3> splatU;  ///< tangent vectors in the world, scene units: half axes of the splat
     Image<glm::vec3> splatV;
 
     /// How the surface answers to light (glTF 2.0, 3.9.2 and 3.9.3), for engines: nothing here
-    /// draws it. Empty when absent; else one value per pixel, zero for pixels without a point.
+    /// draws it. Empty when absent; else one value per pixel, zero for pixels without a point, but
+    /// for pruned ones beside kept ones, and for views that had none (unpack()).
     Image<glm::vec2> metallicRoughness;  ///< metallic, roughness, 0..1
     Image<glm::vec3> emissive;  ///< linear light that `texture` does not hold; may exceed 1
 

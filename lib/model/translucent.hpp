@@ -11,7 +11,11 @@ namespace stx {
 /// all around, which outlines, partly covered, are too narrow for. Both images have one size.
 [[nodiscard]] Image<std::uint8_t> translucentInside(const Texture& texture,
                                                     const Image<float>& depth);
-/// Whether there is one.
+/// 1 for the points of translucent surfaces, which surface mode draws opaque: those inside, and
+/// those a few pixels around them, over the border. Empty where no point is inside.
+[[nodiscard]] Image<std::uint8_t> translucentSurfaces(const Texture& texture,
+                                                      const Image<float>& depth);
+/// Whether a point is inside of a translucent surface.
 [[nodiscard]] bool hasTranslucentInside(const Texture& texture, const Image<float>& depth);
 
 }  // namespace stx

@@ -10,6 +10,9 @@
 namespace stx {
 namespace {
 
+/// Metallic and roughness where a material does not say them (MaterialSampler).
+constexpr glm::vec2 kUnsaidMetallicRoughness{0, 1};
+
 struct Contents {
     bool linear = false, normals = false, splats = false;
     bool metallicRoughness = false, emissive = false;
@@ -81,6 +84,11 @@ void fillPage(const ReferenceView& view, const AtlasRectangle& r, int padding, A
         forEachPixel(r, view.depth.size(), padding,
                      [&](glm::ivec2 p, glm::ivec2 v) { to.at(p.x, p.y) = from.at(v.x, v.y); });
     });
+    // Others on the page have them; zeros would be smooth plastic.
+    if (view.metallicRoughness.empty() && !page.metallicRoughness.empty())
+        forEachPixel(r, view.depth.size(), padding, [&](glm::ivec2 p, glm::ivec2) {
+            page.metallicRoughness.at(p.x, p.y) = kUnsaidMetallicRoughness;
+        });
 }
 
 /// Images, zero everywhere, of all that the views have beside colour and depth; `to` is a page or

@@ -90,8 +90,9 @@ struct JoinedObjects {
 /// are coloured from the nearest covered ones and are background (alpha 0). Of views that lack
 /// pixels those in outsideBits() have full alpha instead (the object is there, another view gives
 /// its distance), and next to rectangles the padding decides. unpack(pack(b)) == b for points and
-/// pixels of partial coverage. Views without metallic-roughness come back with zeros where others
-/// have it. Errors: an atlas that fails check(), memory over the limit.
+/// pixels of partial coverage. Views without metallic-roughness come back with 0 and 1, which is
+/// what materials are that do not say them, where others have it. Errors: an atlas that fails
+/// check(), memory over the limit.
 [[nodiscard]] Result<Bundle> unpack(const Atlas& atlas, Job& job);
 
 }  // namespace stx

@@ -20,7 +20,7 @@ namespace {
 
 /// Side of the squares that are looked at together, and that a budget left over gives back, pixels.
 constexpr int kBlock = 16;
-/// Pruned pixels keep their colour this near to kept ones.
+/// Pruned pixels keep their colour, normal and material this near to kept ones.
 constexpr int kColourBand = 4;
 /// Background pixels this near to pruned ones, and not beside kept ones, are untold as well.
 constexpr int kSilhouetteBand = 2;
@@ -300,8 +300,11 @@ void keepOnly(const Image<std::uint8_t>& kept, ReferenceView& view) {
             view.depth.at(x, y) = kNoDepth;
             if (auto* c = view.texture.rgba8()) c->at(x, y).a = 255;
             if (auto* c = view.texture.rgbaFloat()) c->at(x, y).a = 1.0f;
-            if (view.hasNormals()) view.normal.at(x, y) = glm::vec3(0);
             if (view.hasSplats()) view.splatU.at(x, y) = view.splatV.at(x, y) = glm::vec3(0);
+            // What filters mix with kept pixels stays as far as colours do: a pixel that is drawn
+            // from pruned texels alone would be lit without a normal, or as of smooth plastic.
+            if (state.at(x, y) != 2) continue;
+            if (view.hasNormals()) view.normal.at(x, y) = glm::vec3(0);
             if (!view.metallicRoughness.empty()) view.metallicRoughness.at(x, y) = glm::vec2(0);
             if (!view.emissive.empty()) view.emissive.at(x, y) = glm::vec3(0);
         }

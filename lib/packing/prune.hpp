@@ -49,10 +49,11 @@ struct PruneReport {
 ///
 /// A pixel taken away has no depth but full alpha: "the object is here, another view gives its
 /// distance". Renderers take no empty space from it. So are the background pixels beside pruned
-/// silhouettes. It keeps its colour next to kept pixels, for filters, and next to colours that were
-/// never measured (NoDepth::unknown), which all stay; farther off the colours are smooth. A view
-/// with NoDepth::unknown becomes NoDepth::empty where lacksDepthByMask(): where an atlas keeps
-/// nothing of it is then empty or pruned.
+/// silhouettes. It keeps its colour, normal, metallic-roughness and emission next to kept pixels,
+/// for filters, and next to colours that were never measured (NoDepth::unknown), which all stay;
+/// farther off the colours are smooth and the others zero. A view with NoDepth::unknown becomes
+/// NoDepth::empty where lacksDepthByMask(): where an atlas keeps nothing of it is then empty or
+/// pruned.
 ///
 /// Errors: settings out of range; a bundle that fails check(); a budget below what can be kept
 /// without a hole, with that number; cancelled. A pruned bundle gives the same bytes on any number

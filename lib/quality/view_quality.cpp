@@ -33,6 +33,11 @@ Result<ViewQuality> ViewQuality::against(Renderer& truth, std::vector<Camera> ca
 }
 
 Result<ViewQuality> ViewQuality::against(const Mesh& mesh, int side, Job& job) {
+    return against(*makeMeshRenderer(mesh, {}, job), mesh, side, job);
+}
+
+Result<ViewQuality> ViewQuality::against(Renderer& truth, const Mesh& mesh, int side,
+                                         const Job& job) {
     ViewFraming framing;
     framing.width = framing.height = side;
     ViewLayout layout;
@@ -44,7 +49,7 @@ Result<ViewQuality> ViewQuality::against(const Mesh& mesh, int side, Job& job) {
         STX_TRY(const auto camera, frameCamera(direction, framing, points, sphere, false));
         cameras.push_back(camera);
     }
-    return against(*makeMeshRenderer(mesh, {}, job), std::move(cameras), job);
+    return against(truth, std::move(cameras), job);
 }
 
 ViewQuality ViewQuality::of(std::span<const ReferenceView> views) {

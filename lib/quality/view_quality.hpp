@@ -28,6 +28,9 @@ class ViewQuality {
     /// Against a mesh itself: six pictures from all sides, as somebody would look at the object.
     /// Errors: those of frameCamera() and render(), cancelled.
     [[nodiscard]] static Result<ViewQuality> against(const Mesh& mesh, int side, Job& job);
+    /// The same pictures of a mesh, drawn by another renderer, which is not needed afterwards.
+    [[nodiscard]] static Result<ViewQuality> against(Renderer& truth, const Mesh& mesh, int side,
+                                                     const Job& job);
     /// Against what views show, where they are the truth: on black.
     [[nodiscard]] static ViewQuality of(std::span<const ReferenceView> views);
 

@@ -9,6 +9,7 @@
 #include "lib/render/outline/round_outlines.hpp"
 #include "lib/render/surface/backend.hpp"
 #include "lib/render/surface/fill/fill.hpp"
+#include "lib/render/surface/missing_normals.hpp"
 #include "lib/render/surface/view_normals.hpp"
 #include "lib/surface/depth_gradient.hpp"
 
@@ -276,6 +277,7 @@ void SurfaceRenderer::light(const Camera& camera, Frame& frame) const {
     const Lighting lighting =
         lightsInWorld(settings_.lighting, lightPose(camera).worldFromCamera());
     const glm::dmat3 worldFromCamera = glm::mat3_cast(camera.orientation);
+    borrowNormals(camera, frame);
     parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < width; ++x) {
@@ -284,7 +286,7 @@ void SurfaceRenderer::light(const Camera& camera, Frame& frame) const {
                 if (!hasPoint(dist) || !(pixel.a > 0.0f)) continue;
                 const glm::vec3 toEye(-camera.viewDirection(x + 0.5, y + 0.5));
                 glm::vec3& normal = frame.normal.at(x, y);
-                // What was filled has no normal of its own.
+                // What was filled may have none far and wide.
                 if (normal == glm::vec3(0.0f)) normal = toEye;
                 const glm::dvec3 world =
                     camera.position + worldFromCamera * camera.unproject(x + 0.5, y + 0.5, dist);

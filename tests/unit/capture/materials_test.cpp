@@ -174,23 +174,31 @@ TEST(CapturedMaterials, TravelThroughAnAtlas) {
     }
 }
 
-TEST(CapturedMaterials, PrunedPixelsLoseThem) {
-    Bundle bundle = captured(withMaterials(), {before(), before(0.1)});
-    Job job;
-    const auto report = prune(bundle, {}, job);
-    ASSERT_TRUE(report) << report.error().text();
-    std::int64_t without = 0;
-    for (const auto& view : bundle.views) {
-        for (std::size_t i = 0; i < view.depth.count(); ++i) {
-            const bool point = hasPoint(view.depth.pixels()[i]);
-            EXPECT_EQ(view.metallicRoughness.pixels()[i] != glm::vec2(0), point);
-            if (!point) {
-                EXPECT_EQ(view.emissive.pixels()[i], glm::vec3(0));
-            }
-            without += !point && view.texture.rgba8()->pixels()[i].a == 255 ? 1 : 0;
-        }
+// Filters mix them with kept ones.
+TEST(CapturedMaterials, PrunedPixelsKeepThemAndNormalsAsFarAsColours) {
+    CaptureSettings settings = withMaterials();
+    settings.meshNormals = true;
+    const Bundle bundle = captured(settings);
+    const ReferenceView& whole = bundle.views.at(0);
+    ReferenceView view = whole;
+    // Of the square, which is at 2 to 13.
+    constexpr int kKept = 4, kBand = 4;
+    Image<std::uint8_t> kept(16, 16, std::uint8_t{0});
+    for (int y = 0; y < 16; ++y)
+        for (int x = 0; x < kKept; ++x) kept.at(x, y) = 1;
+    keepOnly(kept, view);
+    for (int x = 2; x < 14; ++x) {
+        EXPECT_EQ(hasPoint(view.depth.at(x, 8)), x < kKept) << x;
+        const bool near = x < kKept + kBand;
+        EXPECT_EQ(view.normal.at(x, 8), near ? whole.normal.at(x, 8) : glm::vec3(0)) << x;
+        EXPECT_EQ(view.metallicRoughness.at(x, 8),
+                  near ? whole.metallicRoughness.at(x, 8) : glm::vec2(0))
+            << x;
+        EXPECT_EQ(view.emissive.at(x, 8), near ? whole.emissive.at(x, 8) : glm::vec3(0)) << x;
     }
-    EXPECT_GT(without, 0) << "nothing was pruned";
+    EXPECT_NE(view.normal.at(6, 8), glm::vec3(0));
+    EXPECT_NE(view.metallicRoughness.at(6, 8), glm::vec2(0));
+    EXPECT_NE(view.emissive.at(6, 8), glm::vec3(0));
 }
 
 TEST(CapturedMaterials, AnotherSizeIsRefused) {

@@ -44,6 +44,26 @@ TEST(LayoutCameras, SeeASinglePoint) {
     }
 }
 
+TEST(LayoutCameras, OfARingTurnFromStraightAboveAsFromJustBeside) {
+    for (const double side : {1.0, -1.0}) {
+        for (const glm::dvec3 up : {glm::dvec3(0, 1, 0), glm::dvec3(1, 2, 0.5)}) {
+            ViewFraming framing;
+            framing.up = up;
+            ViewLayout above, beside;
+            above.kind = beside.kind = ViewLayout::Kind::ring;
+            above.count = beside.count = 4;
+            above.elevationRad = side * std::numbers::pi / 2;
+            beside.elevationRad = side * (std::numbers::pi / 2 - 1e-4);
+            const auto a = layoutCameras(above, framing, kPoints),
+                       b = layoutCameras(beside, framing, kPoints);
+            ASSERT_TRUE(a && b);
+            for (std::size_t i = 0; i < 4; ++i)
+                EXPECT_GT(std::abs(glm::dot((*a)[i].orientation, (*b)[i].orientation)), 1 - 1e-6)
+                    << side << ' ' << i;
+        }
+    }
+}
+
 TEST(DepthRange, OfWhatIsFlatFollowsItsDistance) {
     for (const float distance : {3e-9f, 1e-12f, 1.0f, 1e6f}) {
         ReferenceView view;

@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 #include <cstdlib>
 
 #include <meshoptimizer.h>
@@ -340,6 +341,35 @@ TEST(Ply, WhatIsDroppedIsSaid) {
     EXPECT_NEAR(splats.mesh.colours[0].r, 1.0f, 1e-4f);
     EXPECT_NEAR(splats.mesh.colours[0].g, linearFromSrgb(0.5f), 1e-4f);
     EXPECT_NEAR(splats.mesh.colours[0].b, 0.0f, 1e-4f);
+}
+
+// Two faces of a roof share two vertices, whose normals are no directions.
+TEST(BrokenNormals, OfVerticesThatFacesShareAreThoseOfEachFace) {
+    const float h = std::sqrt(0.5f);
+    const auto roof = readGoodText(
+        fmt::format("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+                    "property float z\nproperty float nx\nproperty float ny\nproperty float nz\n"
+                    "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+                    "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+                    "-1 0 0 {0} 0 {1} 255 0 0\n0 -1 1 0 0 0 0 255 0\n0 1 1 0 0 0 0 0 255\n"
+                    "1 0 0 {1} 0 {1} 255 255 255\n3 0 1 2\n3 3 2 1\n",
+                    -h, h),
+        "a.ply");
+    EXPECT_TRUE(roof.hasNote("PLY: 2 normals are no directions; those of the triangles are used"));
+    const Mesh& mesh = roof.mesh;
+    ASSERT_EQ(mesh.triangles.size(), 2u);
+    ASSERT_EQ(mesh.positions.size(), 6u);
+    ASSERT_EQ(mesh.colours.size(), 6u);
+    for (const auto& t : mesh.triangles) {
+        const float side = mesh.positions[t[0]].x;
+        for (int k = 0; k < 3; ++k) {
+            EXPECT_LT(glm::length(mesh.normals[t[k]] - glm::vec3(side * h, 0, h)), 1e-5f);
+            const glm::vec3 at = mesh.positions[t[k]];
+            if (at.x == 0) {
+                EXPECT_EQ(mesh.colours[t[k]].g, at.y < 0 ? 1.0f : 0.0f);
+            }
+        }
+    }
 }
 
 }  // namespace

@@ -55,6 +55,24 @@ TEST(Obj, VerticesWithoutAColourAreWhiteBesideColoured) {
         EXPECT_EQ(coloursOfTwo("", "0 1 0", line + "\n"), (Two{white, green})) << line;
 }
 
+TEST(Obj, AlphaBehindColoursIsLeftOut) {
+    const glm::vec4 white(1), red(1, 0, 0, 1), green(0, 1, 0, 1), blue(0, 0, 1, 1);
+    using Two = std::array<glm::vec4, 2>;
+    EXPECT_EQ(coloursOfTwo("1 0 0 1", "0 1 0 1.0"), (Two{red, green})) << "full: no note";
+    EXPECT_EQ(coloursOfTwo("1 0 0 1", "0 1 0"), (Two{red, green}));
+    EXPECT_EQ(coloursOfTwo("", "1 0 0 1"), (Two{white, red}));
+    EXPECT_EQ(coloursOfTwo("0 0 255 255", "255 0 0 255"), (Two{blue, red})) << "bytes";
+    for (const std::string colour : {"1 0 0 .5", "255 0 0 128"}) {
+        std::string text;
+        for (int i = 0; i < 3; ++i) text += fmt::format("v {} {} 0 {}\n", i / 2, i % 2, colour);
+        const auto model = readGoodText(text + "f 1 2 3\n", "a.obj");
+        ASSERT_EQ(model.mesh.colours.size(), 3u) << colour;
+        EXPECT_EQ(model.mesh.colours[0], red) << colour;
+        EXPECT_TRUE(model.hasNote("the alpha of vertex colours (v X Y Z R G B A) is not used"));
+        EXPECT_EQ(model.notes.size(), 1u);
+    }
+}
+
 TEST(Obj, ColoursALittleAbove1AreNoBytes) {
     const auto isBytes = [](std::initializer_list<glm::vec3> colours) {
         ColourRange range;

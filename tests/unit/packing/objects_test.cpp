@@ -75,6 +75,35 @@ TEST(PackObjects, EachComesBackAsFromAnAtlasOfItsOwn) {
     }
 }
 
+// Zeros would make smooth plastic of it.
+TEST(PackObjects, WithoutMaterialsAreRoughBesideThoseThatHaveThem) {
+    for (const auto layout : {PackSettings::Layout::grid, PackSettings::Layout::tight}) {
+        auto given = threeObjects();
+        for (ReferenceView& view : given[0].bundle.views)
+            view.metallicRoughness =
+                Image<glm::vec2>(view.depth.width(), view.depth.height(), glm::vec2(0.5f, 0.25f));
+        Job job;
+        const auto joined = joinObjects(std::move(given), job);
+        ASSERT_TRUE(joined) << joined.error().text();
+        const auto sheet = pack(joined->bundle, settingsOf(layout, *joined), job);
+        ASSERT_TRUE(sheet) << sheet.error().text();
+        for (const auto& [name, expected] :
+             {std::pair("cup", glm::vec2(0.5f, 0.25f)), std::pair("jug", glm::vec2(0, 1))}) {
+            const auto object = objectOf(*sheet, name);
+            ASSERT_TRUE(object) << object.error().text();
+            const auto bundle = unpack(*object, job);
+            ASSERT_TRUE(bundle) << bundle.error().text();
+            for (const ReferenceView& view : bundle->views) {
+                ASSERT_EQ(view.metallicRoughness.size(), view.depth.size());
+                for (std::size_t i = 0; i < view.depth.count(); ++i)
+                    if (hasPoint(view.depth.data()[i])) {
+                        ASSERT_EQ(view.metallicRoughness.data()[i], expected) << name;
+                    }
+            }
+        }
+    }
+}
+
 TEST(PackObjects, OfViewsOneByOneGiveTheSameAtlas) {
     for (const auto layout : {PackSettings::Layout::grid, PackSettings::Layout::tight}) {
         Job job;
