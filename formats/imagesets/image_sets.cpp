@@ -244,8 +244,10 @@ Result<SetDescription> describeFirst(const std::filesystem::path& path,
     return set;
 }
 
-/// Options for the moments of what moves: cameras of each by itself would tremble.
+/// Options for the moments of what moves: cameras of each by itself would tremble, and in some of
+/// them a camera may see nothing.
 ImageSetOptions ofMoment(ImageSetOptions options) {
+    options.ofFilm = true;
     if (options.refine.of(RefineStep::poses) == RefineSwitch::automatic)
         options.refine.set(RefineStep::poses, false);
     return options;
