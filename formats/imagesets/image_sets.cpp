@@ -143,6 +143,11 @@ Result<Motion> motionToRead(SetDescription& set, const ImageSetOptions& options,
         takeEvery(set.views, options.every);
         return motion;
     }
+    if (motion.doubtfulCameras > 0)
+        job.note(
+            fmt::format("pictures of one pose are taken for those of one camera, which makes {} "
+                        "cameras; 'camera' of each frame says otherwise",
+                        motion.doubtfulCameras));
     // Before moments are left out: the film begins with the first of them that shows something.
     STX_CHECK(within(where, leaveMissingOut(set, motion, options.strict, job)));
     takeEvery(motion.times, options.every);

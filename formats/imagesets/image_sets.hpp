@@ -125,9 +125,9 @@ struct ImageSetKind {
                                           const ImageSetOptions& options, Job& job);
 
 /// All frames of a set, one of a set without time. Which pictures belong to one camera the set says
-/// (`camera` of transforms.json); else those of one pose do, and where no pose comes twice, one
-/// camera moves. Reads no pixel before a frame is asked for. Errors as readImageSet(); (usage)
-/// the step `poses` of a set that moves: it is of one moment.
+/// (`camera` of transforms.json); else those of one pose do, and where no pose comes back after
+/// another, one camera moves. Reads no pixel before a frame is asked for. Errors as readImageSet();
+/// (usage) the step `poses` of a set that moves: it is of one moment.
 [[nodiscard]] Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path,
                                                              const ImageSetOptions& options,
                                                              Job& job);

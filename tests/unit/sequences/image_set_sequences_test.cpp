@@ -288,6 +288,55 @@ TEST(MovingSets, WhereNoPoseComesTwiceOneCameraMoves) {
     EXPECT_DOUBLE_EQ(last->views[0].camera.position.x, 7);
 }
 
+TEST(MovingSets, ACameraThatRestsBetweenIsOneCamera) {
+    // At the beginning, for three pictures amid its way, and out of the order of time.
+    for (const auto& shots : {std::vector<Shot>{{"", 0, 0, 1}, {"", 1, 0, 2}, {"", 2, 5, 3}},
+                              std::vector<Shot>{{"", 0, 0, 1},
+                                                {"", 1, 1, 2},
+                                                {"", 2, 2, 3},
+                                                {"", 3, 2, 4},
+                                                {"", 4, 2, 5},
+                                                {"", 5, 5, 6}},
+                              std::vector<Shot>{{"", 2, 5, 3}, {"", 1, 0, 2}, {"", 0, 0, 1}}}) {
+        TemporaryFolder folder;
+        const auto set = writeShots(folder, shots);
+        Job job;
+        const auto sequence = openImageSet(set, {}, job);
+        ASSERT_TRUE(sequence) << sequence.error().text();
+        EXPECT_EQ(notesOf(job), "");
+        ASSERT_EQ((*sequence)->timeline().count(), shots.size());
+        const auto last = (*sequence)->frame(shots.size() - 1, job);
+        ASSERT_TRUE(last) << last.error().text();
+        ASSERT_EQ(last->views.size(), 1u);
+        EXPECT_DOUBLE_EQ(last->views[0].camera.position.x, 5);
+    }
+}
+
+TEST(MovingSets, PosesThatComeBackAreCamerasWithANoteWhereThatIsInDoubt) {
+    const auto camerasOf = [](const std::vector<double>& x, std::string& notes) {
+        TemporaryFolder folder;
+        std::vector<Shot> shots;
+        for (std::size_t i = 0; i < x.size(); ++i)
+            shots.push_back({"", static_cast<double>(i), x[i], static_cast<int>(i)});
+        Job job;
+        const auto sequence = openImageSet(writeShots(folder, shots), {}, job);
+        EXPECT_TRUE(sequence) << sequence.error().text();
+        notes = notesOf(job);
+        const auto frame = (*sequence)->frame(0, job);
+        EXPECT_TRUE(frame) << frame.error().text();
+        return frame ? frame->views.size() : 0;
+    };
+    std::string notes;
+    EXPECT_EQ(camerasOf({0, 5, 0, 5}, notes), 2u);
+    EXPECT_EQ(notes, "");
+    EXPECT_EQ(camerasOf({0, 0, 5, 5}, notes), 2u) << "one after the other";
+    EXPECT_EQ(notes, "");
+    EXPECT_EQ(camerasOf({0, 1, 2, 1, 0}, notes), 3u);
+    EXPECT_EQ(notes,
+              "pictures of one pose are taken for those of one camera, which makes 3 cameras; "
+              "'camera' of each frame says otherwise\n");
+}
+
 TEST(MovingSets, ARecordingIsOfOneCameraEvenWhereItRests) {
     TemporaryFolder folder;
     std::string pictures, poses;
