@@ -53,8 +53,8 @@ bool movesAndRests(const SetDescription& set, const std::vector<double>& moments
 /// Which camera took each view.
 struct Takers {
     std::vector<std::string> names;  ///< of each view
-    /// Cameras that were told apart by their poses, of which some took one picture only: they may
-    /// be one that moves. 0: none.
+    /// Cameras of which only poses say that they are several, and some took one picture only: they
+    /// may be one that moves. 0: none.
     std::size_t doubtful = 0;
 };
 

@@ -22,8 +22,8 @@ struct Motion {
                                 ///< (pictures of one moment may be half a microsecond apart)
     double end = 0;             ///< when the last picture ends
 
-    /// How many cameras were told apart by their poses alone where some took one picture only, so
-    /// that they may be one that moves; 0: there is no doubt.
+    /// How many cameras there are where only poses say so and some took one picture only, so that
+    /// they may be one that moves; 0: there is no doubt.
     std::size_t doubtfulCameras = 0;
 
     [[nodiscard]] bool moves() const { return times.size() > 1; }
