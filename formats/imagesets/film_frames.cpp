@@ -43,10 +43,34 @@ int nearest(const std::vector<double>& times, double time) {
     return static_cast<int>((later ? next : before) - times.begin());
 }
 
+enum class TakenFor { colour, depth };
+
+/// The track of a film that is taken for colour or depth. Depth is grey as a rule and colour is
+/// not: of several tracks it is the only one of that kind, else the first. A note says which.
+int trackFor(const Film& film, TakenFor use, Job& job) {
+    const auto& tracks = film.tracks();
+    const auto videos = std::ranges::count_if(tracks, &Film::Track::video);
+    const bool grey = use == TakenFor::depth;
+    const auto isOfKind = [grey](const Film::Track& track) {
+        return track.video && track.pixels.starts_with("gray") == grey;
+    };
+    const bool onlyOne = std::ranges::count_if(tracks, isOfKind) == 1;
+    if (videos > 1)
+        job.note(fmt::format("{} has {} tracks of video; the {} is taken for {}",
+                             inQuotes(film.path().string()), videos,
+                             !onlyOne ? "first"
+                             : grey   ? "grey one"
+                                      : "one that is not grey",
+                             grey ? "depth" : "colour"));
+    if (videos < 2 || !onlyOne) return film.firstVideo();
+    return static_cast<int>(std::ranges::find_if(tracks, isOfKind) - tracks.begin());
+}
+
 /// A film that the command names: in the folder of the cameras, or from where we are. What the
 /// cameras' file puts into the name for {name} reaches nothing outside.
 Result<std::shared_ptr<Film>> openNamed(const path& folder, const std::string& pattern,
-                                        const Placeholders& words, bool strict, Job& job) {
+                                        const Placeholders& words, TakenFor use, bool strict,
+                                        Job& job) {
     const std::string name = filled(pattern, words);
     std::error_code ec;
     const path inFolder = (folder / name).lexically_normal();
@@ -61,7 +85,7 @@ Result<std::shared_ptr<Film>> openNamed(const path& folder, const std::string& p
         return failAt(inQuotes(name), ErrorCode::io, "it exists neither in '{}' nor where stx runs",
                       folder.string());
     STX_TRY(auto film, Film::open(file, job.limits));
-    STX_CHECK(film->select(film->firstVideo(), strict, job));
+    STX_CHECK(film->select(trackFor(*film, use, job), strict, job));
     return std::shared_ptr<Film>(std::move(film));
 }
 
@@ -244,8 +268,10 @@ Result<std::vector<FilmPair>> openPairs(const std::vector<SetView>& views, const
         const Placeholders words{view.name, view.camera.width, view.camera.height, options.frame};
         FilmPair pair;
         pair.name = !each && !view.taker.empty() ? view.taker : view.name;
-        STX_TRY(pair.colour, openNamed(folder, options.texturePattern, words, options.strict, job));
-        STX_TRY(pair.depth, openNamed(folder, options.depthPattern, words, options.strict, job));
+        STX_TRY(pair.colour, openNamed(folder, options.texturePattern, words, TakenFor::colour,
+                                       options.strict, job));
+        STX_TRY(pair.depth, openNamed(folder, options.depthPattern, words, TakenFor::depth,
+                                      options.strict, job));
         pair.views = {i};
         pairs.push_back(std::move(pair));
     }
@@ -254,10 +280,7 @@ Result<std::vector<FilmPair>> openPairs(const std::vector<SetView>& views, const
 
 /// Turns depth as its colour is, where it does not say itself how it lies and its shape does.
 void turnDepth(const FilmPair& pair, Job& job) {
-    const auto trackOf = [](const Film& film) -> const Film::Track& {
-        return film.tracks()[static_cast<std::size_t>(film.firstVideo())];
-    };
-    const Film::Track &colour = trackOf(*pair.colour), &depth = trackOf(*pair.depth);
+    const Film::Track &colour = pair.colour->chosen(), &depth = pair.depth->chosen();
     if (colour.turn.none() || !depth.turn.none()) return;
     const DepthTurn turn =
         depthTurnOf({depth.width, depth.height}, {colour.width, colour.height},

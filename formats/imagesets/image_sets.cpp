@@ -100,25 +100,19 @@ Result<void> checkOptions(const ImageSetOptions& o) {
     return {};
 }
 
-/// Each N-th view of a set, or each N-th moment of one that moves.
-void takeEvery(SetDescription& set, Motion& motion, int every) {
+/// Each N-th of all, from the first.
+template <class T>
+void takeEvery(std::vector<T>& all, int every) {
     if (every <= 1) return;
-    const auto thin = [every](auto& all) {
-        std::remove_reference_t<decltype(all)> some;
-        for (std::size_t i = 0; i < all.size(); i += static_cast<std::size_t>(every))
-            some.push_back(std::move(all[i]));
-        all = std::move(some);
-    };
-    if (motion.moves())
-        thin(motion.times);
-    else
-        thin(set.views);
+    std::vector<T> some;
+    for (std::size_t i = 0; i < all.size(); i += static_cast<std::size_t>(every))
+        some.push_back(std::move(all[i]));
+    all = std::move(some);
 }
 
 /// Pictures of a film whose files are missing are left out, with a note: their cameras show those
 /// before, and the film begins with the first that is there. Errors when `strict`, or when none is.
 Result<void> leaveMissingOut(const SetDescription& set, Motion& motion, bool strict, Job& job) {
-    if (!motion.moves()) return {};
     for (std::size_t i = 0; i < set.views.size(); ++i)
         if (set.views[i].missing) motion.gone.emplace(i, *set.views[i].missing);
     if (motion.gone.empty()) return {};
@@ -129,7 +123,9 @@ Result<void> leaveMissingOut(const SetDescription& set, Motion& motion, bool str
             track.views, [&](std::size_t picture) { return motion.gone.contains(picture); });
     });
     if (motion.tracks.empty()) return tl::unexpected(first);
-    while (motion.nothingBegan(set, 0)) motion.times.erase(motion.times.begin());
+    // All times are still there (see motionToRead()), that of a picture which is there among them.
+    while (motion.times.size() > 1 && motion.nothingBegan(set, 0))
+        motion.times.erase(motion.times.begin());
     job.note(
         fmt::format("{} of {} pictures {} missing, and their cameras show the ones before; the "
                     "first: {}",
@@ -138,13 +134,26 @@ Result<void> leaveMissingOut(const SetDescription& set, Motion& motion, bool str
     return {};
 }
 
-/// How a set moves, with each N-th view or moment of it; see leaveMissingOut().
+/// How a set moves, with each N-th view or moment of it; see leaveMissingOut(). Where one moment is
+/// left of a film, its pictures become the views of a set that stands still.
 Result<Motion> motionToRead(SetDescription& set, const ImageSetOptions& options,
                             const std::string& where, Job& job) {
     STX_TRY(Motion motion, within(where, motionOf(set, options)));
-    takeEvery(set, motion, options.every);
+    if (!motion.moves()) {
+        takeEvery(set.views, options.every);
+        return motion;
+    }
+    if (motion.doubtfulCameras > 0)
+        job.note(
+            fmt::format("pictures of one pose are taken for those of one camera, which makes {} "
+                        "cameras; 'camera' of each frame says otherwise",
+                        motion.doubtfulCameras));
+    // Before moments are left out: the film begins with the first of them that shows something.
     STX_CHECK(within(where, leaveMissingOut(set, motion, options.strict, job)));
-    return motion;
+    takeEvery(motion.times, options.every);
+    if (motion.moves()) return motion;
+    set.views = motion.moment(set, 0).views;
+    return Motion();
 }
 
 /// Puts the damaged picture of a track that is shown at a frame with those that are gone, and the
@@ -240,8 +249,10 @@ Result<SetDescription> describeFirst(const std::filesystem::path& path,
     return set;
 }
 
-/// Options for the moments of what moves: cameras of each by itself would tremble.
+/// Options for the moments of what moves: cameras of each by itself would tremble, and in some of
+/// them a camera may see nothing.
 ImageSetOptions ofMoment(ImageSetOptions options) {
+    options.ofFilm = true;
     if (options.refine.of(RefineStep::poses) == RefineSwitch::automatic)
         options.refine.set(RefineStep::poses, false);
     return options;
@@ -261,6 +272,11 @@ class SetSequence : public Sequence {
         } else if (set_.frames > 1) {
             const int count = (set_.frames + options_.every - 1) / options_.every;
             timeline_ = steadyTimeline(count, set_.rate / options_.every);
+            // Of a film whose length is no multiple of N the last frame is shown for less than N.
+            if (timeline_.moves()) {
+                timeline_.end = set_.frames / set_.rate;
+                timeline_.findTick();
+            }
         }
         // One origin for all frames, from what is known before a pixel is read.
         if (set_.origin) return;

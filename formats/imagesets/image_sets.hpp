@@ -96,6 +96,9 @@ struct ImageSetOptions {
     /// rounds it between those of all frames wants it as it was: rounded twice, it would be off by
     /// half a step of both.
     bool roundFrames = true;
+    /// The views are those of a moment of a film, of which others show more: a picture that says
+    /// that nothing is there is a view without a point. Readers of films set it themselves.
+    bool ofFilm = false;
     /// Pictures of 16-bit integers become linear floats, of which they come back to the bit (then
     /// all pictures of the set do); else they are rounded to 8 bits, with a note.
     bool deepColour = false;
@@ -122,9 +125,9 @@ struct ImageSetKind {
                                           const ImageSetOptions& options, Job& job);
 
 /// All frames of a set, one of a set without time. Which pictures belong to one camera the set says
-/// (`camera` of transforms.json); else those of one pose do, and where no pose comes twice, one
-/// camera moves. Reads no pixel before a frame is asked for. Errors as readImageSet(); (usage)
-/// the step `poses` of a set that moves: it is of one moment.
+/// (`camera` of transforms.json); else those of one pose do, and where no pose comes back after
+/// another, one camera moves. Reads no pixel before a frame is asked for. Errors as readImageSet();
+/// (usage) the step `poses` of a set that moves: it is of one moment.
 [[nodiscard]] Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path,
                                                              const ImageSetOptions& options,
                                                              Job& job);

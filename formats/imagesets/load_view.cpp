@@ -147,7 +147,16 @@ Result<ReferenceView> finish(const SetView& set, std::string name, const Camera&
     view.camera = camera;
     view.texture = std::move(texture);
     view.depth = std::move(depth);
-    if (!anyPoint(view.depth)) return view;
+    if (!anyPoint(view.depth)) {
+        // No point says where planes are. The bits are those of the film's other pictures.
+        if (set.planes) {
+            view.nearPlane = set.planes->nearPlane;
+            view.farPlane = set.planes->farPlane;
+            if (set.depthBits != 0) view.depthBits = set.depthBits;
+        }
+        if (options.depthBits != 0) view.depthBits = options.depthBits;
+        return view;
+    }
     bleedColour(view.texture);
     setPlanes(view, set, options, job);
     return view;
@@ -468,6 +477,16 @@ Result<void> undoLens(const SetView& set, const Camera& camera, StoredView& stor
     return {};
 }
 
+/// Whether a picture of a film may be one in which nothing is to be seen: what it shows may have
+/// left it. Depth that is missing everywhere though something is there is damage, as a sensor has
+/// it that lost a frame. `stored`: with distances.
+bool mayBeEmpty(const SetView& set, const ImageSetOptions& options, NoDepth noDepth,
+                const StoredView& stored) {
+    // A depth camera's pixels are not the picture's, and empty faces of panoramas are left out.
+    if (!options.ofFilm || set.depthCamera || set.panorama) return false;
+    return noDepth == NoDepth::empty || set.noDepth || openEverywhere(stored);
+}
+
 }  // namespace
 
 Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSetOptions& options,
@@ -489,9 +508,14 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
                          toDistances(set, options, ofDepth, stored, noDepth, report, job)));
         if (!raise) camera = ofDepth;
     }
-    STX_CHECK(within(fmt::format("'{}'", set.depth.name), needDepth(stored.depth, showsNothing)));
-
-    STX_CHECK(repair(set, options, stored, report, showsNothing, job));
+    const bool mayShowNothing = mayBeEmpty(set, options, noDepth, stored);
+    if (mayShowNothing && !anyPoint(stored.depth)) {
+        stored.depth = Image<float>(stored.texture.width(), stored.texture.height(), kNoDepth);
+    } else {
+        STX_CHECK(
+            within(fmt::format("'{}'", set.depth.name), needDepth(stored.depth, showsNothing)));
+        STX_CHECK(repair(set, options, stored, report, showsNothing, job));
+    }
 
     std::vector<ReferenceView> views;
     if (set.panorama) {
@@ -515,10 +539,11 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
     if (!set.lens.ideal()) STX_CHECK(undoLens(set, camera, stored, job));
     STX_TRY(auto view, finish(set, set.name, camera, std::move(stored.texture),
                               std::move(stored.depth), stored.alpha, noDepth, options, job));
-    STX_CHECK(
-        within(fmt::format("'{}'", set.depth.name),
-               needDepth(view.depth, showsNothing,
-                         "every pixel with a valid depth is transparent or outside the picture")));
+    if (!mayShowNothing)
+        STX_CHECK(within(
+            fmt::format("'{}'", set.depth.name),
+            needDepth(view.depth, showsNothing,
+                      "every pixel with a valid depth is transparent or outside the picture")));
     views.push_back(std::move(view));
     return views;
 }

@@ -34,28 +34,59 @@ std::size_t momentNumber(double time, const std::vector<double>& moments) {
     return static_cast<std::size_t>(std::ranges::upper_bound(moments, time) - moments.begin()) - 1;
 }
 
-/// Which camera took each view, by name.
-std::vector<std::string> takersOf(const SetDescription& set, const std::vector<double>& moments) {
-    std::vector<std::string> takers;
+/// Whether views of which some have the same pose are those of one camera that moves and rests now
+/// and then: one picture for each moment, no pose that comes back after another, and more poses
+/// than half of the pictures. Where each camera stands still and took two pictures, there are no
+/// more than half.
+bool movesAndRests(const SetDescription& set, const std::vector<double>& moments,
+                   std::size_t poses) {
+    if (moments.size() != set.views.size() || 2 * poses <= set.views.size()) return false;
+    std::vector<const SetView*> inTime;
+    for (const SetView& view : set.views) inTime.push_back(&view);
+    std::ranges::sort(inTime, {}, [](const SetView* view) { return *view->time; });
+    std::size_t moves = 0;
+    for (std::size_t i = 1; i < inTime.size(); ++i)
+        moves += poseOf(inTime[i]->camera) != poseOf(inTime[i - 1]->camera);
+    return moves + 1 == poses;
+}
+
+/// Which camera took each view.
+struct Takers {
+    std::vector<std::string> names;  ///< of each view
+    /// Cameras of which only poses say that they are several, and some took one picture only: they
+    /// may be one that moves. 0: none.
+    std::size_t doubtful = 0;
+};
+
+Takers takersOf(const SetDescription& set, const std::vector<double>& moments) {
+    Takers takers;
     if (std::ranges::any_of(set.views, [](const SetView& v) { return !v.taker.empty(); })) {
         for (const SetView& view : set.views)
-            takers.push_back(view.taker.empty() ? "camera" : view.taker);
+            takers.names.push_back(view.taker.empty() ? "camera" : view.taker);
         return takers;
     }
-    std::map<Pose, std::size_t> poses;  // in order of appearance
-    for (const SetView& view : set.views) poses.emplace(poseOf(view.camera), poses.size());
-    if (poses.size() == 1 || poses.size() < set.views.size()) {
+    struct OfPose {
+        std::size_t number, pictures;
+    };
+    std::map<Pose, OfPose> poses;  // numbers in order of appearance
+    for (const SetView& view : set.views)
+        ++poses.try_emplace(poseOf(view.camera), OfPose{poses.size(), 0}).first->second.pictures;
+    if (poses.size() == 1 || movesAndRests(set, moments, poses.size())) {
+        takers.names.assign(set.views.size(), "camera");
+        return takers;
+    }
+    if (poses.size() < set.views.size()) {
         for (const SetView& view : set.views)
-            takers.push_back(poses.size() == 1
-                                 ? "camera"
-                                 : fmt::format("camera{}", poses.at(poseOf(view.camera))));
+            takers.names.push_back(fmt::format("camera{}", poses.at(poseOf(view.camera)).number));
+        if (std::ranges::any_of(poses, [](const auto& pose) { return pose.second.pictures == 1; }))
+            takers.doubtful = poses.size();
         return takers;
     }
     // No pose comes twice: cameras move, as many as there are pictures of one moment.
     std::vector<std::size_t> ofMoment(moments.size());
     for (const SetView& view : set.views) {
         const std::size_t rank = ofMoment[momentNumber(*view.time, moments)]++;
-        takers.push_back(rank == 0 ? "camera" : fmt::format("camera{}", rank));
+        takers.names.push_back(rank == 0 ? "camera" : fmt::format("camera{}", rank));
     }
     return takers;
 }
@@ -147,7 +178,8 @@ Result<Motion> motionOf(const SetDescription& set, const ImageSetOptions& option
                      : times.back() + span / static_cast<double>(times.size() - 1);
     motion.times = std::move(times);
 
-    const auto takers = takersOf(set, motion.times);
+    const auto [takers, doubtful] = takersOf(set, motion.times);
+    motion.doubtfulCameras = doubtful;
     for (std::size_t i = 0; i < set.views.size(); ++i) {
         auto track = std::ranges::find(motion.tracks, takers[i], &Motion::Track::name);
         if (track == motion.tracks.end())

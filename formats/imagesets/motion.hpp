@@ -22,6 +22,10 @@ struct Motion {
                                 ///< (pictures of one moment may be half a microsecond apart)
     double end = 0;             ///< when the last picture ends
 
+    /// How many cameras there are where only poses say so and some took one picture only, so that
+    /// they may be one that moves; 0: there is no doubt.
+    std::size_t doubtfulCameras = 0;
+
     [[nodiscard]] bool moves() const { return times.size() > 1; }
     [[nodiscard]] Timeline timeline() const;
     /// Pictures that cannot be used and why: missing files, damage. By index of

@@ -70,6 +70,15 @@ NoDepth noDepthOf(const SetView& set, const ImageSetOptions& options, StoredView
     return open ? NoDepth::empty : NoDepth::unknown;
 }
 
+bool openEverywhere(const StoredView& stored) {
+    if (!stored.alpha) return false;
+    const auto pixels = static_cast<std::size_t>(stored.texture.width()) *
+                        static_cast<std::size_t>(stored.texture.height());
+    for (std::size_t i = 0; i < pixels; ++i)
+        if (stored.texture.alpha(i) >= 1.0f) return false;
+    return true;
+}
+
 void dropImpossible(Image<float>& distances) {
     for (float& d : distances.pixels())
         if (!(d > 0 && d < kNothing)) d = kNoDepth;

@@ -14,6 +14,10 @@ void coverOnlyPoints(Texture& texture, Image<float>& depth, bool ownAlpha, bool 
 [[nodiscard]] NoDepth noDepthOf(const SetView& set, const ImageSetOptions& options,
                                 StoredView& stored);
 
+/// Whether the picture has no pixel that is covered in full: nothing was in front of its camera, by
+/// its alpha or by the depth of nothing that noDepthOf() found.
+[[nodiscard]] bool openEverywhere(const StoredView& stored);
+
 /// Distances that are floats in scene units: NaN, 0 and negative values (not known), infinity and
 /// huge values (1e9 and more: nothing is there) are none.
 void dropImpossible(Image<float>& distances);

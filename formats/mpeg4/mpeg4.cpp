@@ -121,6 +121,31 @@ Result<void> writeText(const Document& source, const std::filesystem::path& path
     return folder.commitWith(file);
 }
 
+/// Whether a text begins as BT may: behind comments a descriptor, a command, a PROTO, or a node
+/// that can hold a scene, which may have a name. VRML has such nodes, too, behind a first line of
+/// its own.
+bool beginsAsBt(std::string_view text) {
+    constexpr std::string_view kBlanks = " \t\r\n,";
+    constexpr std::string_view kWords[] = {"InitialObjectDescriptor",
+                                           "Group",
+                                           "OrderedGroup",
+                                           "Layer2D",
+                                           "Layer3D",
+                                           "DEF",
+                                           "PROTO",
+                                           "EXTERNPROTO",
+                                           "AT",
+                                           "RAP"};
+    if (text.starts_with("#VRML") || text.starts_with("#X3D")) return false;
+    for (;;) {
+        text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
+        if (!text.starts_with('#')) break;
+        text.remove_prefix(std::min(text.find_first_of("\r\n"), text.size()));
+    }
+    const auto first = text.substr(0, text.find_first_of(" \t\r\n,{#"));
+    return std::ranges::find(kWords, first) != std::end(kWords);
+}
+
 }  // namespace
 
 std::optional<Mpeg4Container> mpeg4ContainerOf(const std::filesystem::path& path) {
@@ -139,9 +164,7 @@ std::optional<Mpeg4Container> mpeg4ContainerOf(ByteSpan head) {
     if (first != std::string_view::npos && text[first] == '<' &&
         text.find("<XMT-A") != std::string_view::npos)
         return Mpeg4Container::xmt;
-    for (const std::string_view word : {"InitialObjectDescriptor", "Group {", "OrderedGroup {"})
-        if (first != std::string_view::npos && text.substr(first).starts_with(word))
-            return Mpeg4Container::bt;
+    if (beginsAsBt(text)) return Mpeg4Container::bt;
     return {};
 }
 

@@ -15,7 +15,8 @@ enum class Mpeg4Container { mp4, bt, xmt };
 
 /// By the ending (.mp4 .m4v .bt .xmt .xmta, in any case of letters); nothing for others.
 [[nodiscard]] std::optional<Mpeg4Container> mpeg4ContainerOf(const std::filesystem::path& path);
-/// By the first bytes of a file: an ftyp box, XML with <XMT-A, or BT's words.
+/// By the first bytes of a file: an ftyp box, XML with <XMT-A, or, behind comments, a word
+/// that BT may begin with.
 [[nodiscard]] std::optional<Mpeg4Container> mpeg4ContainerOf(ByteSpan head);
 
 /// Reads a presentation. The content decides which container it is; where it does not, the ending

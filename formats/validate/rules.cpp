@@ -68,7 +68,7 @@ constexpr Rule kRules[] = {
     {4003, error, kDibr, "there is a depth image, or the texture has alpha"},
     {4004, warning, kFile, "depth is stored without loss (PNG)"},
     {4005, error, kFile, "images can be decoded"},
-    {4006, warning, kDibr, "each view has a point"},
+    {4006, warning, kDibr, "each view has a point, of a film at some time"},
     {4007, error, kDibr, "the object has a point"},
     {4008, warning, kDibr, "the depth image has no alpha"},
     {4009, warning, kDibr, "each DepthImage has a texture"},

@@ -1,3 +1,6 @@
+#include <map>
+#include <utility>
+
 #include "formats/any/open.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/imagesets/image_sets.hpp"
@@ -35,6 +38,22 @@ Result<std::vector<Finding>> validateImageSet(const std::filesystem::path& path,
     return unreadable(error);
 }
 
+/// Takes away what is no fault of a frame where other frames of the film do without it: a view, or
+/// all of them, without a point (rules 4006 and 4007). `files`: the findings of each.
+void forgiveEmptyFrames(std::vector<std::vector<Finding>>& files) {
+    std::map<std::pair<int, std::string>, std::size_t> counts;
+    const auto isOfFrame = [](const Finding& f) {
+        return f.rule->number == 4006 || f.rule->number == 4007;
+    };
+    for (const auto& found : files)
+        for (const Finding& f : found)
+            if (isOfFrame(f)) ++counts[{f.rule->number, f.where}];
+    for (auto& found : files)
+        std::erase_if(found, [&](const Finding& f) {
+            return isOfFrame(f) && counts[{f.rule->number, f.where}] < files.size();
+        });
+}
+
 /// Each file of a film, its findings with its name, and files that are missing between others.
 Result<std::vector<Finding>> validateNumbered(const std::filesystem::path& path,
                                               const ValidateOptions& options, Job& job) {
@@ -43,11 +62,16 @@ Result<std::vector<Finding>> validateNumbered(const std::filesystem::path& path,
     if (const auto gap = firstMissing(files))
         findings.add(1003, "", fmt::format("no file number {}", *gap),
                      "the files between the first and the last");
+    std::vector<std::vector<Finding>> each;
     for (const NumberedFile& file : files) {
         STX_CHECK(job.checkCancelled());
         STX_TRY(auto found, validateFile(file.path, options, job));
-        for (Finding& finding : found) {
-            const std::string name = fmt::format("'{}'", file.path.filename().string());
+        each.push_back(std::move(found));
+    }
+    forgiveEmptyFrames(each);
+    for (std::size_t i = 0; i < files.size(); ++i) {
+        for (Finding& finding : each[i]) {
+            const std::string name = fmt::format("'{}'", files[i].path.filename().string());
             finding.where = finding.where.empty() ? name : name + ": " + finding.where;
             findings.list.push_back(std::move(finding));
         }

@@ -401,7 +401,8 @@ class DocumentValidator {
         const auto highest = checkViewPixels(node, texture, where, inOctree, pictures());
         if (!highest) return;
         ++decoded_;
-        if (*highest == 0) countEmpty(where);
+        // A camera of a film may begin later, or what it sees come into its picture.
+        if (*highest == 0 && !anyPointLater(texture, pictures(), job_)) countEmpty(where);
     }
 
     void checkVectorImages(const Node& node, const Node& texture, const std::string& where,

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "formats/files/base64.hpp"
+#include "formats/mpeg4/mapping/media_clock.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mapping/view_notes.hpp"
 #include "lib/surface/normals.hpp"
@@ -157,6 +158,32 @@ std::optional<std::uint32_t> checkViewPixels(const Node& depthImage, const Node&
                      pictures.findings);
     }
     return highest;
+}
+
+bool anyPointLater(const Node& texture, const PictureReader& pictures, const Job& job) {
+    const NodePtr& depth = texture.get<NodePtr>("depth");
+    const NodePtr& image = depth ? depth : texture.get<NodePtr>("texture");
+    const ElementaryStream* stream = image ? pictures.images.stream(*image) : nullptr;
+    if (!stream || stream->samples.size() < 2) return false;
+    StreamImages later = pictures.images;
+    // A copy, since a reference lives until the next is asked for.
+    const Presentation shown =  // NOLINT(performance-unnecessary-copy-initialization)
+        later.presentation(*stream);
+    const auto run = runOfMovie(*image, shown.duration);
+    std::vector<double> times;
+    // One cycle shows all pictures.
+    if (!run || !addChanges(*image, shown, 0, std::max(run->start, 0.0) + run->cycle, times))
+        return false;
+    for (const double time : times) {
+        if (!job.checkCancelled()) return false;
+        later.setTime(time);
+        const auto codes =
+            later.decode(*image, pictures.decoder, pictures.limits,
+                         depth ? StreamImages::Samples::codes : StreamImages::Samples::colours);
+        if (!codes) return false;
+        if (highestCode(*codes, depth ? 0 : codes->channels - 1) > 0) return true;
+    }
+    return false;
 }
 
 void checkMasks(const std::vector<ShownInfo>& infos, const PictureReader& pictures) {

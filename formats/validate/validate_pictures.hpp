@@ -42,6 +42,11 @@ struct PictureReader {
                                                            const std::string& where, bool inOctree,
                                                            const PictureReader& pictures);
 
+/// Whether a later picture of the stream that has a view's depth shows a point (`texture` is its
+/// SimpleTexture). Decodes them until one does; false where one cannot be decoded, too.
+[[nodiscard]] bool anyPointLater(const mpeg4::Node& texture, const PictureReader& pictures,
+                                 const Job& job);
+
 /// Rule 4005 on the masks that WorldInfo has of pixels without depth (see ViewNotes).
 void checkMasks(const std::vector<mpeg4::ShownInfo>& infos, const PictureReader& pictures);
 

@@ -234,6 +234,7 @@ Result<void> Film::select(int track, bool strict, Job& job) {
         return failAt(where(), ErrorCode::invalidInput,
                       "its pictures are {}x{} pixels; each side must be 1 to {}", chosenTrack.width,
                       chosenTrack.height, limits_.maxImageSide);
+    track_ = track;
     turn_ = chosenTrack.turn;
     video::Packer request;
     request.put(static_cast<std::int32_t>(track));

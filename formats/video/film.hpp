@@ -50,6 +50,8 @@ class Film {
     /// when `strict`.
     [[nodiscard]] Result<void> select(int track, bool strict, Job& job);
 
+    /// The track that select() chose.
+    [[nodiscard]] const Track& chosen() const { return tracks_[static_cast<std::size_t>(track_)]; }
     /// Turns its pictures so, and not as its track says. After select().
     void turn(video::Turn how) { turn_ = how; }
 
@@ -78,6 +80,7 @@ class Film {
     std::mutex mutex_;
     std::unique_ptr<VideoProcess> process_;
     std::vector<Track> tracks_;
+    int track_ = 0;            ///< the chosen one
     video::Turn turn_;         ///< of the chosen track
     std::vector<Unit> units_;  ///< in the order of decoding
     std::vector<CodedPicture> coded_;

@@ -1,6 +1,7 @@
 #include "formats/yuv/y4m_reader.hpp"
 
 #include <algorithm>
+#include <optional>
 
 #include "lib/base/printable.hpp"
 #include "lib/base/whole_number.hpp"
@@ -57,6 +58,7 @@ struct Y4mHeaderLine {
 
 Result<Y4mHeaderLine> parseHeader(std::string_view line, const Limits& limits) {
     std::string_view chroma = "420jpeg";
+    std::optional<bool> fullSaid;
     Y4mHeaderLine out;
     int width = 0, height = 0;
     line.remove_prefix(kMagic.size());
@@ -78,7 +80,9 @@ Result<Y4mHeaderLine> parseHeader(std::string_view line, const Limits& limits) {
         } else if (word[0] == 'I') {
             out.interlaced = value == "t" || value == "b" || value == "m";
         } else if (word == "XCOLORRANGE=FULL") {
-            out.fullRange = true;
+            fullSaid = true;
+        } else if (word == "XCOLORRANGE=LIMITED") {
+            fullSaid = false;
         }
     }
     if (width == 0 || height == 0)
@@ -92,6 +96,9 @@ Result<Y4mHeaderLine> parseHeader(std::string_view line, const Limits& limits) {
                       "-pix_fmt yuv420p OUT.y4m",
                       chroma);
     out.format = *format;
+    // Where it is not said, luma alone is of full range, as ffmpeg writes it, and luma with chroma
+    // is not.
+    out.fullRange = fullSaid.value_or(!out.format.chroma);
     out.format.width = width;
     out.format.height = height;
     out.format.chromaLeft = chroma == "420mpeg2" || chroma == "420paldv" ||

@@ -12,7 +12,8 @@ namespace stx {
 
 /// A file of uncompressed video frames (YUV4MPEG2), any frame at random. 4:2:0, 4:2:2, 4:4:4 and
 /// luma alone, of 8 to 16 bits; the colours of BT.709 from 720 lines on, else of BT.601, as players
-/// take them; XCOLORRANGE=FULL is 0..255. Opening finds where the frames are, and reads none.
+/// take them; XCOLORRANGE=FULL is 0..255, and so is luma alone that does not say its range. Opening
+/// finds where the frames are, and reads none.
 class Y4mReader {
   public:
     /// Errors (invalidInput), with the byte: no such file, sizes out of range, a kind of pixels

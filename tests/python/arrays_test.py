@@ -114,6 +114,15 @@ class Arrays(Case):
         self.assertEqual(still.mask(frames[4])[15, 18], 255)
         self.assertEqual(still.mask(frames[4])[2, 2], 0)
 
+    def test_transparent_pixels_of_frames_do_not_count(self):
+        frames = np.full((8, 30, 40, 4), (120, 120, 120, 255), np.uint8)
+        frames[:6, 10:20, 10:20] = (255, 0, 0, 0)
+        still = stx.background(frames)
+        np.testing.assert_array_equal(still.colour[15, 15], (120, 120, 120, 255))
+        np.testing.assert_array_equal(still.colour[2, 2], (120, 120, 120, 255))
+        with self.assertRaises(stx.Error):
+            stx.background(frames, method="n2pg")
+
     def test_a_film_remembers_what_was_uncovered(self):
         camera = stx.Camera((40, 30), 40)
         bundles = []

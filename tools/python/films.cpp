@@ -136,7 +136,8 @@ class ArrayFrames final : public StillFrames {
         auto image = std::make_shared<Rgba8Image>(size_.x, size_.y);
         const std::uint8_t* from = data_ + static_cast<std::size_t>(k) * image->count() * channels_;
         for (glm::u8vec4& pixel : image->pixels()) {
-            pixel = {from[0], from[1], from[2], 255};
+            const std::uint8_t alpha = channels_ == 4 ? from[3] : std::uint8_t{255};
+            pixel = {from[0], from[1], from[2], alpha};
             from += channels_;
         }
         return std::shared_ptr<const Rgba8Image>(std::move(image));
@@ -182,7 +183,7 @@ void bindStillBackground(py::module_& module) {
                                               "who pass, as stx.background() finds it.")
         .def_property_readonly(
             "colour", [](const StillPointer& b) { return arrayOf(b->colour, b); },
-            "(height, width, 4) uint8, sRGB, opaque.")
+            "(height, width, 4) uint8, sRGB, opaque; 0 where no frame shows anything.")
         .def_property_readonly(
             "confidence", [](const StillPointer& b) { return arrayOf(b->confidence, b); },
             "(height, width) uint8: how far frames agree with each pixel, 0 (none) to 255 (all).")

@@ -111,8 +111,11 @@ std::vector<ViewRange> FilmRanges::finish(const Bundle& first, Job& job) {
                 fmt::format("view '{}': it is pruned in some frames and not in others; in MPEG-4 "
                             "it is in all",
                             view.name));
-        // No frame of it has a point.
-        if (range.farPlane == 0) addPlanes(range, view);
+        if (range.farPlane > 0) continue;
+        addPlanes(range, view);
+        // Pruning and backgrounds leave such views on purpose.
+        if (!range.everPruned && !view.background)
+            job.note(fmt::format("view '{}': no frame of it has a point", view.name));
     }
     return std::move(ranges_);
 }

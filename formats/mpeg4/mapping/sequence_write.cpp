@@ -453,6 +453,9 @@ class SequenceWriter {
     /// Durations, and MovieTextures where a stream has become one.
     Result<void> finish() {
         STX_CHECK(video_->finish());
+        // Depth that became video is not in the pictures of the first frame: see noteVideo().
+        for (std::size_t k = 0; k < std::min(tracks_.size(), loss_.depth.size()); ++k)
+            if (tracks_[k].video[1] >= 0) loss_.depth[k] = {};
         loss_.note(options_, job_);
         if (asVideo()) noteVideo();
         STX_TRY(const ByteSource source, spool_.source());

@@ -81,6 +81,12 @@ void DepthLoss::add(const ViewHeader& view, int bits, double worstDepth, double 
     bits_ = bits_ == 0 ? bits : std::min(bits_, bits);
 }
 
+void DepthLoss::add(const DepthLoss& other) {
+    if (other.bits_ == 0) return;
+    worst_ = std::max(worst_, other.worst_);
+    bits_ = bits_ == 0 ? other.bits_ : std::min(bits_, other.bits_);
+}
+
 void DepthLoss::note(Job& job) const {
     if (worst_ > 0)
         job.note(fmt::format("depth is rounded to {} bits: at most {:.4g} scene units off", bits_,
@@ -89,14 +95,17 @@ void DepthLoss::note(Job& job) const {
 
 void PictureLoss::add(std::size_t i, const ViewHeader& view, int bits, const ViewImages& images) {
     const double step = i < ownSteps.size() ? ownSteps[i] : view.depthCode().step();
-    depth.add(view, bits, images.worstDepth, step);
+    if (depth.size() <= i) depth.resize(i + 1);
+    depth[i].add(view, bits, images.worstDepth, step);
     linear = linear || images.linear;
     clamped = clamped || images.clamped;
     coverage = coverage || images.coverageLost;
 }
 
 void PictureLoss::note(const SceneWriteOptions& options, Job& job) const {
-    depth.note(job);
+    DepthLoss ofAll;
+    for (const DepthLoss& ofView : depth) ofAll.add(ofView);
+    ofAll.note(job);
     Rgba8Loss{.linear = linear, .clipped = clamped}.note(job);
     if (options.texture == SceneWriteOptions::Texture::jpeg && !options.pointTexture)
         job.note(fmt::format("colour is JPEG of quality {}, which is lossy", options.jpegQuality));

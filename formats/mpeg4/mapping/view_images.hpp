@@ -2,6 +2,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/scene/placement.hpp"
@@ -31,6 +32,8 @@ class DepthLoss {
     /// units between codes of its bits and its own planes; where a film has one range for all
     /// frames, depth may be further off than half of it.
     void add(const ViewHeader& view, int bits, double worstDepth, double ownStep);
+    /// Adds what was added to another.
+    void add(const DepthLoss& other);
     /// Says how far off depth is, if some is.
     void note(Job& job) const;
 
@@ -41,7 +44,7 @@ class DepthLoss {
 
 /// What pictures of MPEG-4 lose of the views that are added, for notes.
 struct PictureLoss {
-    DepthLoss depth;
+    std::vector<DepthLoss> depth;  ///< of each view
     bool linear = false, clamped = false, coverage = false;
     /// DepthLoss::add()'s of each view, where the views have the range of a film; else empty.
     std::vector<double> ownSteps;

@@ -39,17 +39,23 @@ Result<BtToken> BtLexer::take() {
     return taken;
 }
 
+void BtLexer::countLine() {
+    const bool returns = text_[at_] == '\r';
+    if (text_[at_] != '\n' && !returns) return;
+    // Of CR LF the second counts.
+    if (returns && text_.substr(at_ + 1).starts_with('\n')) return;
+    ++line_;
+    lineStart_ = at_ + 1;
+}
+
 Result<void> BtLexer::advance() {
     for (;;) {
         while (at_ < text_.size() && isBlank(text_[at_])) {
-            if (text_[at_] == '\n') {
-                ++line_;
-                lineStart_ = at_ + 1;
-            }
+            countLine();
             ++at_;
         }
         if (at_ < text_.size() && text_[at_] == '#') {
-            while (at_ < text_.size() && text_[at_] != '\n') ++at_;
+            while (at_ < text_.size() && text_[at_] != '\n' && text_[at_] != '\r') ++at_;
             continue;
         }
         break;
@@ -75,10 +81,7 @@ Result<void> BtLexer::advance() {
             if (text_[at_] == '\\' && at_ + 1 < text_.size() &&
                 (text_[at_ + 1] == first || text_[at_ + 1] == '\\'))
                 ++at_;
-            if (text_[at_] == '\n') {
-                ++line_;
-                lineStart_ = at_ + 1;
-            }
+            countLine();
             token_.value += text_[at_];
         }
         if (at_ == text_.size())

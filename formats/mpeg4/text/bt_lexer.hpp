@@ -22,7 +22,7 @@ struct BtToken {
 
 // clang-format off
 /// Cuts a BT text into tokens, one at a time and without a copy:
-///  - blanks and commas separate; `#` begins a comment that runs to the end of the line;
+///  - blanks and commas separate; `#` begins a comment that runs to the end of the line (LF, CR LF or CR);
 ///  - each of `{ } [ ]` is a token;
 ///  - text in `"` or `'` is a string, in which a backslash escapes a quote or a backslash;
 ///  - all else is words: numbers, names, `TR.translation`, `od:10`.
@@ -47,6 +47,8 @@ class BtLexer {
 
   private:
     Result<void> advance();
+    /// Counts a line where at_ is at the end of one.
+    void countLine();
 
     std::string_view text_;
     std::string name_;

@@ -78,6 +78,38 @@ TEST(FilmPairs, AreASetInTime) {
     }
 }
 
+TEST(FilmPairs, OneFileMayHoldBothTracks) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    writeFilms(folder);
+    const auto set = writeCameras(folder, pose(0));
+    Job quiet;
+    const auto pair = openImageSet(set, filmOptions(), quiet);
+    ASSERT_TRUE(pair) << pair.error().text();
+    const auto expected = (*pair)->frame(3, quiet);
+    ASSERT_TRUE(expected) << expected.error().text();
+    for (const char* order : {"-map 0:v -map 1:v", "-map 1:v -map 0:v"}) {
+        SCOPED_TRACE(order);
+        films::ffmpeg(folder.path(),
+                      fmt::format("-i colour.mp4 -i depth.mkv {} -c copy both.mkv", order));
+        ImageSetOptions options;
+        options.texturePattern = options.depthPattern = "both.mkv";
+        Job job;
+        const auto read = openImageSet(set, options, job);
+        ASSERT_TRUE(read) << read.error().text();
+        const auto notes = job.takeNotes();
+        for (const char* said : {"both.mkv' has 2 tracks of video; the grey one is taken for depth",
+                                 "the one that is not grey is taken for colour"})
+            EXPECT_TRUE(std::ranges::any_of(notes, [&](const std::string& note) {
+                return note.find(said) != std::string::npos;
+            })) << fmt::format("{}", fmt::join(notes, "\n"));
+        const auto bundle = (*read)->frame(3, job);
+        ASSERT_TRUE(bundle) << bundle.error().text();
+        EXPECT_TRUE(bundle->views[0].depth == expected->views[0].depth);
+        EXPECT_EQ(bundle->views[0].texture.at(9, 9), expected->views[0].texture.at(9, 9));
+    }
+}
+
 TEST(FilmPairs, AlphaOfColourIsTheSetsOwn) {
     REQUIRE_VIDEO();
     const TemporaryFolder folder;

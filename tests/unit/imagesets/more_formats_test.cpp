@@ -165,6 +165,12 @@ TEST(Miv, YuvFramesAndSizesThatDoNotFit) {
         ASSERT_TRUE(shown) << shown.error().text();
         EXPECT_EQ(shown->views[0].pointCount(), w * (frame + 1));
     }
+    ImageSetOptions second;
+    second.every = 2;
+    const auto thinned = openImageSet(folder.path(), second, job);
+    ASSERT_TRUE(thinned) << thinned.error().text();
+    EXPECT_EQ((*thinned)->timeline().count(), 2u);
+    EXPECT_NEAR((*thinned)->timeline().end, 3 / 25.0, 1e-9) << "as long as it is with all frames";
     ImageSetOptions options;
     options.frame = 3;
     expectError(readSet(folder.path(), options), {"frame 3", "3"});

@@ -7,58 +7,11 @@
 #include "formats/imagesets/image_sets.hpp"
 #include "lib/model/same_pictures.hpp"
 #include "tests/shared_data.hpp"
-#include "tests/unit/imagesets/set_writer.hpp"
+#include "tests/unit/sequences/shots.hpp"
 
 using namespace stx;
 using namespace sets;
-
-namespace {
-
-/// A picture of a camera: its depth is 1000 + `depth` mm everywhere.
-struct Shot {
-    std::string camera;
-    double time = 0;
-    double x = 0;  ///< of the camera
-    int depth = 0;
-};
-
-/// transforms.json with pictures of 8x6.
-std::filesystem::path writeShots(const TemporaryFolder& folder, const std::vector<Shot>& shots,
-                                 const std::string& head = "") {
-    std::string frames;
-    for (std::size_t i = 0; i < shots.size(); ++i) {
-        const Shot& s = shots[i];
-        const std::vector<std::uint8_t> rgb(8 * 6 * 3, static_cast<std::uint8_t>(i));
-        const std::vector<std::uint16_t> depth(8 * 6, static_cast<std::uint16_t>(1000 + s.depth));
-        writeBytes(folder / fmt::format("c{}.png", i), *encodePng(8, 6, 3, 8, rgb.data(), true));
-        writeBytes(folder / fmt::format("d{}.png", i),
-                   *encodePng(8, 6, 1, 16, depth.data(), false));
-        frames += fmt::format(
-            "{}{{\"file_path\":\"c{}.png\",\"depth_file_path\":\"d{}.png\",\"time\":{}{},"
-            "\"transform_matrix\":[[1,0,0,{}],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}}",
-            i ? "," : "", i, i, s.time,
-            s.camera.empty() ? "" : fmt::format(",\"camera\":\"{}\"", s.camera), s.x);
-    }
-    writeText(folder / "transforms.json",
-              fmt::format("{{\"w\":8,\"h\":6,\"fl_x\":8,{}\"frames\":[{}]}}", head, frames));
-    return folder / "transforms.json";
-}
-
-std::unique_ptr<Sequence> opened(const std::filesystem::path& set, ImageSetOptions options = {}) {
-    Job job;
-    auto sequence = openImageSet(set, options, job);
-    EXPECT_TRUE(sequence) << sequence.error().text();
-    return sequence ? std::move(*sequence) : nullptr;
-}
-
-float depthOf(Sequence& sequence, std::size_t frame, std::size_t view) {
-    Job job;
-    const auto bundle = sequence.frame(frame, job);
-    EXPECT_TRUE(bundle) << bundle.error().text();
-    return bundle ? bundle->views.at(view).depth.at(3, 3) : 0;
-}
-
-}  // namespace
+using namespace shots;
 
 TEST(MovingSets, CamerasShowTheirLastPicture) {
     TemporaryFolder folder;
@@ -333,6 +286,55 @@ TEST(MovingSets, WhereNoPoseComesTwiceOneCameraMoves) {
     ASSERT_TRUE(last);
     ASSERT_EQ(last->views.size(), 1u);
     EXPECT_DOUBLE_EQ(last->views[0].camera.position.x, 7);
+}
+
+TEST(MovingSets, ACameraThatRestsBetweenIsOneCamera) {
+    // At the beginning, for three pictures amid its way, and out of the order of time.
+    for (const auto& shots : {std::vector<Shot>{{"", 0, 0, 1}, {"", 1, 0, 2}, {"", 2, 5, 3}},
+                              std::vector<Shot>{{"", 0, 0, 1},
+                                                {"", 1, 1, 2},
+                                                {"", 2, 2, 3},
+                                                {"", 3, 2, 4},
+                                                {"", 4, 2, 5},
+                                                {"", 5, 5, 6}},
+                              std::vector<Shot>{{"", 2, 5, 3}, {"", 1, 0, 2}, {"", 0, 0, 1}}}) {
+        TemporaryFolder folder;
+        const auto set = writeShots(folder, shots);
+        Job job;
+        const auto sequence = openImageSet(set, {}, job);
+        ASSERT_TRUE(sequence) << sequence.error().text();
+        EXPECT_EQ(notesOf(job), "");
+        ASSERT_EQ((*sequence)->timeline().count(), shots.size());
+        const auto last = (*sequence)->frame(shots.size() - 1, job);
+        ASSERT_TRUE(last) << last.error().text();
+        ASSERT_EQ(last->views.size(), 1u);
+        EXPECT_DOUBLE_EQ(last->views[0].camera.position.x, 5);
+    }
+}
+
+TEST(MovingSets, PosesThatComeBackAreCamerasWithANoteWhereThatIsInDoubt) {
+    const auto camerasOf = [](const std::vector<double>& x, std::string& notes) {
+        TemporaryFolder folder;
+        std::vector<Shot> shots;
+        for (std::size_t i = 0; i < x.size(); ++i)
+            shots.push_back({"", static_cast<double>(i), x[i], static_cast<int>(i)});
+        Job job;
+        const auto sequence = openImageSet(writeShots(folder, shots), {}, job);
+        EXPECT_TRUE(sequence) << sequence.error().text();
+        notes = notesOf(job);
+        const auto frame = (*sequence)->frame(0, job);
+        EXPECT_TRUE(frame) << frame.error().text();
+        return frame ? frame->views.size() : 0;
+    };
+    std::string notes;
+    EXPECT_EQ(camerasOf({0, 5, 0, 5}, notes), 2u);
+    EXPECT_EQ(notes, "");
+    EXPECT_EQ(camerasOf({0, 0, 5, 5}, notes), 2u) << "one after the other";
+    EXPECT_EQ(notes, "");
+    EXPECT_EQ(camerasOf({0, 1, 2, 1, 0}, notes), 3u);
+    EXPECT_EQ(notes,
+              "pictures of one pose are taken for those of one camera, which makes 3 cameras; "
+              "'camera' of each frame says otherwise\n");
 }
 
 TEST(MovingSets, ARecordingIsOfOneCameraEvenWhereItRests) {

@@ -155,6 +155,50 @@ TEST(VideoFilms, WrittenDepthIsExactToItsBits) {
     EXPECT_TRUE(said("lossless H.264 of 8 or 10 bits"));
 }
 
+/// FarMovingViews with float depth, of which `count` are left: the first one's moves.
+class FloatMovingViews : public FarMovingViews {
+  public:
+    FloatMovingViews(int frames, std::size_t count) : FarMovingViews(frames), count_(count) {}
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        auto bundle = FarMovingViews::frame(index, job);
+        bundle->views.resize(count_);
+        for (ReferenceView& view : bundle->views) {
+            // Within the planes, and on no code.
+            const auto middle = static_cast<float>((view.nearPlane + view.farPlane) / 2);
+            for (float& d : view.depth.pixels())
+                if (hasPoint(d)) d += 1e-5f * (middle - d);
+            view.depthBits = 32;
+        }
+        return bundle;
+    }
+
+  private:
+    std::size_t count_;
+};
+
+// What the pictures of the first frame lose was said of depth, too, that became video.
+TEST(VideoFilms, DepthThatIsVideoIsNotedOnce) {
+    REQUIRE_VIDEO();
+    for (const std::size_t count : {std::size_t{1}, std::size_t{2}}) {
+        TemporaryFolder folder{"video"};
+        FloatMovingViews frames(4, count);
+        Job job;
+        SaveOptions save;
+        save.h264 = 6;
+        const auto done = saveSequence(frames, folder / "a.mp4", save, job);
+        ASSERT_TRUE(done) << done.error().text();
+        const auto notes = job.takeNotes();
+        const auto said = [&](const char* part) {
+            return std::ranges::any_of(
+                notes, [&](const std::string& note) { return note.starts_with(part); });
+        };
+        EXPECT_TRUE(said("depth that moves is lossless H.264"));
+        // The second view stands still and is pictures.
+        EXPECT_EQ(said("depth is rounded to 16 bits"), count == 2)
+            << fmt::format("{}", fmt::join(notes, "\n"));
+    }
+}
+
 /// FarMovingViews as a masked sensor sees them: unknown depth is possible. The first view has it at
 /// a pixel of one frame, the second at none.
 class MaskedViews : public FarMovingViews {

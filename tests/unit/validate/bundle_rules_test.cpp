@@ -191,6 +191,21 @@ TEST(ValidateBundle, ChannelsOfAnExrFileHaveOneSizeAndComeTogether) {
     EXPECT_EQ(numbersOf(validateFile(path, {}, job)), Numbers{4003});
 }
 
+TEST(ValidateBundle, AViewOfAFilmMayBeWithoutAPointForAWhile) {
+    const TemporaryFolder folder;
+    Job job;
+    ReferenceView empty = goodView(2);
+    for (float& d : empty.depth.pixels()) d = kNoDepth;
+    writeUnchecked(folder / "f_0.exr", {goodView(1), empty});
+    writeUnchecked(folder / "f_1.exr", {goodView(1), goodView(2)});
+    const auto film = validateFile(folder / "f_%d.exr", {}, job);
+    EXPECT_EQ(numbersOf(film), Numbers{}) << textOf(film);
+    EXPECT_EQ(numbersOf(validateFile(folder / "f_0.exr", {}, job)), Numbers{4006});
+    writeUnchecked(folder / "f_1.exr", {goodView(1), empty});
+    const auto never = validateFile(folder / "f_%d.exr", {}, job);
+    EXPECT_EQ(numbersOf(never), Numbers{4006}) << textOf(never);
+}
+
 TEST(ValidateBundle, EmptyObjectsAndDamagedFilesAreFindings) {
     const TemporaryFolder folder;
     const auto path = folder / "a.exr";

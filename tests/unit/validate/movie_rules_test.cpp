@@ -49,6 +49,32 @@ TEST(ValidateMovies, AFilmOfOursIsSound) {
     EXPECT_EQ(brokenBy([](Film&) {}), Numbers{});
 }
 
+/// Takes the points of a sample of depth away.
+void emptyDepth(Film& f, std::size_t sample) {
+    ByteRange& data = f.stream(3).samples[sample].data;
+    const auto bytes = data.load(Limits());
+    ASSERT_TRUE(bytes);
+    const auto info = probeImage(*bytes);
+    ASSERT_TRUE(info);
+    const std::vector<std::uint16_t> none(static_cast<std::size_t>(info->width) *
+                                          static_cast<std::size_t>(info->height));
+    const auto png = encodePng(info->width, info->height, 1, info->bits, none.data(), false);
+    ASSERT_TRUE(png);
+    data = ByteRange::of(*png);
+}
+
+TEST(ValidateMovies, AViewMayBeWithoutAPointForAWhile) {
+    EXPECT_EQ(brokenBy([](Film& f) { emptyDepth(f, 0); }), Numbers{});
+    EXPECT_EQ(brokenBy([](Film& f) {
+                  for (const std::size_t sample : {0u, 1u, 2u}) emptyDepth(f, sample);
+              }),
+              Numbers{});
+    EXPECT_EQ(brokenBy([](Film& f) {
+                  for (const std::size_t sample : {0u, 1u, 2u, 3u}) emptyDepth(f, sample);
+              }),
+              Numbers{4006});
+}
+
 TEST(ValidateMovies, PicturesOfAPairHaveTheSameTimes) {
     EXPECT_EQ(brokenBy([](Film& f) { f.stream(3).samples.pop_back(); }), Numbers{7001});
     EXPECT_EQ(brokenBy([](Film& f) { f.stream(3).samples[2].time += 10; }), Numbers{7001});

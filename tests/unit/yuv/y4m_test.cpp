@@ -124,6 +124,22 @@ TEST(Y4mReader, ReadsLumaAloneManyBitsAndFrameParameters) {
     EXPECT_EQ(job.takeNotes().size(), 1u);
 }
 
+TEST(Y4mReader, LumaAloneIsOfFullRangeUnlessItSaysOtherwise) {
+    using std::string_view_literals::operator""sv;
+    const auto greyOf = [](std::string_view text) {
+        Job job;
+        const auto reader = openText(text, job);
+        EXPECT_TRUE(reader) << reader.error().text();
+        return reader ? static_cast<int>((*reader->frame(0, job.limits)).at(0, 0).g) : -1;
+    };
+    EXPECT_EQ(greyOf("YUV4MPEG2 W1 H1 Cmono\nFRAME\n\x20"), 32);
+    EXPECT_EQ(greyOf("YUV4MPEG2 W1 H1 Cmono XCOLORRANGE=FULL\nFRAME\n\x20"), 32);
+    EXPECT_EQ(greyOf("YUV4MPEG2 W1 H1 Cmono XCOLORRANGE=LIMITED\nFRAME\n\x20"), 19);
+    EXPECT_EQ(greyOf("YUV4MPEG2 W1 H1 Cmono10\nFRAME\n\xff\x03"sv), 255);
+    EXPECT_EQ(greyOf("YUV4MPEG2 W1 H1 C444\nFRAME\n\x20\x80\x80"), 19) << "not luma alone";
+    EXPECT_EQ(greyOf("YUV4MPEG2 W1 H1 C444 XCOLORRANGE=FULL\nFRAME\n\x20\x80\x80"), 32);
+}
+
 TEST(Y4mReader, ErrorsSayWhere) {
     Job job;
     const struct {

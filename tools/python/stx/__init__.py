@@ -169,8 +169,9 @@ def background(source: Film | Path | Sequence[Path] | NDArray[np.uint8], *, supp
     Of a film (stx.Film): the film with a view more for each camera that stands still and for a few poses of those that
     move; support: share of the frames that must show a surface, above 0, at most 1; key_views: poses at most, 1..64.
     Of plain video of a camera that stands still, a Background; source: (n, height, width, 3 or 4) uint8, the names of
-    pictures, or a folder, 'frame_%04d.png' or a film's name; method: 'select' (the best), 'n2pg' or 'median';
-    frames: how many to look at, spread evenly, from 2 (0: all). Raises Error: usage, invalidInput, io, unsupported.
+    pictures, or a folder, 'frame_%04d.png' or a film's name; transparent pixels do not count; method: 'select' (the
+    best), 'n2pg' (which refuses transparent pixels) or 'median'; frames: how many to look at, spread evenly, from 2
+    (0: all). Raises Error: usage, invalidInput, io, unsupported.
     """
     moving, plain = {"support": support, "key_views": key_views}, {"method": method, "frames": frames}
     for name in _given(background, plain if isinstance(source, Film) else moving):
