@@ -113,11 +113,11 @@ struct ImageSetKind {
 [[nodiscard]] Result<std::string> recogniseImageSet(const std::filesystem::path& path);
 
 /// Reads one frame of a set; of a set that moves frame 0, with a note, when none is asked for.
-/// Cameras are exact; lens distortion and skew are undone and rotations
-/// repaired, with a note of their size in pixels. Pixels without depth are what
-/// ImageSetOptions::noDepth says; nearPlane and farPlane of each view are fitted. Several views at
-/// a time, in the memory of one per thread beside the bundle. Errors: io, usage (an option that
-/// this kind needs or does not have), invalidInput with file and line or key.
+/// Cameras are exact; lens distortion and skew are undone (views have the pixels of a pinhole that
+/// the picture shows all of) and rotations repaired, with a note of their size in pixels. Pixels
+/// without depth are what ImageSetOptions::noDepth says; nearPlane and farPlane of each view are
+/// fitted. Several views at a time, in the memory of one per thread beside the bundle. Errors: io,
+/// usage (an option that this kind needs or does not have), invalidInput with file and line or key.
 [[nodiscard]] Result<Bundle> readImageSet(const std::filesystem::path& path,
                                           const ImageSetOptions& options, Job& job);
 
