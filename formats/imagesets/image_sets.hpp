@@ -63,7 +63,7 @@ struct ImageSetOptions {
     std::string maskPattern;
     /// What pixels without depth are. Without a value: what the depth itself says (1e9 and more or
     /// infinity somewhere: nothing is there, 0 and NaN are not known), else empty where the picture
-    /// has transparent pixels or a mask, and unknown where it has none.
+    /// has transparent pixels or a mask and all that is opaque has depth, and unknown where not.
     std::optional<NoDepth> noDepth;
     /// Older Middlebury sets: focal length in pixels, and scene units from the first to the last
     /// view that has disparities; 0 = not given.
