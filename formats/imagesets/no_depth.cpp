@@ -14,14 +14,11 @@ void withPixels(Texture& texture, const Work& work) {
         work(*texture.rgbaFloat(), 1.0f);
 }
 
-/// Distances from here on are those of nothing: Blender's is 1e10, others' infinity.
-constexpr float kNothing = 1e9f;
-
 /// Makes a picture transparent where its depth, which may be smaller, has the distance of nothing.
 /// Whether there was such a pixel.
 bool clearNothing(StoredView& stored) {
     const Image<float>& depth = stored.depth;
-    const auto nothing = [](float d) { return d >= kNothing; };
+    const auto nothing = [](float d) { return d >= kDistanceOfNothing; };
     if (std::ranges::none_of(depth.pixels(), nothing)) return false;
     withPixels(stored.texture, [&](auto& image, auto full) {
         for (int y = 0; y < image.height(); ++y) {
@@ -101,7 +98,7 @@ NoDepth noDepthOf(const SetView& set, const ImageSetOptions& options, StoredView
 
 void dropImpossible(Image<float>& distances) {
     for (float& d : distances.pixels())
-        if (!(d > 0 && d < kNothing)) d = kNoDepth;
+        if (!(d > 0 && d < kDistanceOfNothing)) d = kNoDepth;
 }
 
 }  // namespace stx::imagesets

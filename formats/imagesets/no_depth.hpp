@@ -4,6 +4,9 @@
 
 namespace stx::imagesets {
 
+/// Distances from here on are those of nothing: Blender's is 1e10, others' infinity.
+inline constexpr float kDistanceOfNothing = 1e9f;
+
 /// Makes pixels without a point transparent, unless their distance may be unknown. Partly covered
 /// pixels of the set's own alpha stay: they are the silhouette of points beside them.
 void coverOnlyPoints(Texture& texture, Image<float>& depth, bool ownAlpha, bool mayBeUnknown);
