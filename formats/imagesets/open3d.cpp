@@ -105,7 +105,7 @@ Result<std::optional<ToldIntrinsics>> toldIntrinsics(const path& folder, Job& jo
 
 /// Scene units of a step of depth, by the `depth_scale` (steps in one unit) that Open3D writes
 /// beside the intrinsics; nothing: no file has one.
-Result<std::optional<double>> toldDepthUnit(const path& folder, Job& job) {
+Result<std::optional<double>> depthUnitBeside(const path& folder, Job& job) {
     for (const std::string& name : filesIn(folder)) {
         if (path(name).extension() != ".json") continue;
         STX_TRY(const Json json, readJson(folder / name, job.limits));
@@ -194,8 +194,8 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
     PixelIntrinsics k(0);
     double unit = kMillimetre;
     if (options.depthUnit == 0) {
-        STX_TRY(const auto told, toldDepthUnit(folder, job));
-        unit = told.value_or(kMillimetre);
+        STX_TRY(const auto found, depthUnitBeside(folder, job));
+        unit = found.value_or(kMillimetre);
     }
     SetDescription set;
     std::optional<glm::ivec2> size;

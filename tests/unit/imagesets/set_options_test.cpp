@@ -319,7 +319,7 @@ TEST(Intrinsics, OfOpen3dAreAMatrixByColumnsOfPicturesOfASize) {
 }
 
 /// Open3D writes the steps of depth in one metre beside the intrinsics.
-TEST(DepthUnits, OfOpen3dAreToldBesideTheIntrinsics) {
+TEST(DepthUnits, OfOpen3dAreBesideTheIntrinsics) {
     const TemporaryFolder folder;
     writeWall(folder, "open3d");
     const auto write = [&](const char* scale) {
