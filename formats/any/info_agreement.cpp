@@ -28,8 +28,12 @@ Result<nlohmann::ordered_json> agreementJson(const ViewTable& table, bool notes,
     for (std::size_t v = 0; v < bundle.views.size(); ++v) {
         const ViewDisagreement& of = found.views[v];
         out.push_back({{"view", bundle.views[v].name}, {"partners", of.partners}});
-        if (of.partners == 0) continue;
         auto& view = out.back();
+        if (of.beyond > 0) view["beyond"] = of.beyond;
+        if (of.partners == 0) {
+            if (of.beyond > 0) view["disagrees"] = true;
+            continue;
+        }
         view["overlap"] = of.overlap;
         view["disagreement"] = of.relative;
         view["oneSurface"] = of.oneSurface;
@@ -51,12 +55,17 @@ std::string agreementText(const nlohmann::ordered_json& agreement) {
     for (const auto& view : agreement) {
         out += fmt::format("{:<{}}  {:>5}", quotedName(view["view"]), width,
                            view["partners"].get<int>());
+        const bool beyond = view.contains("beyond");
+        const std::string differs =
+            beyond                  ? fmt::format("> {:g} %", 100 * view["beyond"].get<double>())
+            : view.contains("most") ? percentOf(view["disagreement"])
+                                    : "";
+        if (beyond && !view.contains("most")) out += fmt::format("{:9}  {:>7}!", "", differs);
         if (view.contains("most"))
-            out += fmt::format("  {:>5.0f} %  {:>7}{}  {:>11}  {} {}",
-                               100 * view["overlap"].get<double>(), percentOf(view["disagreement"]),
-                               view["disagrees"].get<bool>() ? '!' : ' ',
-                               percentOf(view["oneSurface"]), quotedName(view["most"]["view"]),
-                               percentOf(view["most"]["disagreement"]));
+            out += fmt::format(
+                "  {:>5.0f} %  {:>7}{}  {:>11}  {} {}", 100 * view["overlap"].get<double>(),
+                differs, view["disagrees"].get<bool>() ? '!' : ' ', percentOf(view["oneSurface"]),
+                quotedName(view["most"]["view"]), percentOf(view["most"]["disagreement"]));
         out += "\n";
     }
     return out;

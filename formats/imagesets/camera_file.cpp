@@ -65,15 +65,20 @@ Result<std::vector<imagesets::SetView>> cameraPathInWorld(const imagesets::Json&
     }
     STX_TRY(const Json said, readJson(dataparser, job.limits));
     std::optional<Json> transforms;
-    for (const auto& beside : {folder, dataparser.parent_path()}) {
+    // nerfstudio has its paths in camera_paths/ beside the transforms.json.
+    for (const auto& beside : {folder, folder / "..", dataparser.parent_path()}) {
         if (transforms || !std::filesystem::is_regular_file(beside / "transforms.json", ec))
             continue;
         STX_TRY(transforms, readJson(beside / "transforms.json", job.limits));
     }
     if (auto ok = undoDataparser(said, transforms ? &*transforms : nullptr, views, job); !ok)
         return tl::unexpected(ok.error().at(inQuotes(dataparser.string())));
-    job.note(fmt::format("the cameras are taken out of nerfstudio's normalised world as {} says",
-                         inQuotes(dataparser.string())));
+    job.note(fmt::format("the cameras are taken out of nerfstudio's normalised world as {} says{}",
+                         inQuotes(dataparser.string()),
+                         transforms ? ""
+                                    : "; they are right where the set has no applied_transform, as "
+                                      "its transforms.json is neither in the folder of the path, "
+                                      "nor in the one above, nor beside that file"));
     return views;
 }
 

@@ -30,7 +30,8 @@ constexpr Model kModels[] = {{"SIMPLE_PINHOLE", 3},
                              {"FOV", 5, false},
                              {"SIMPLE_RADIAL_FISHEYE", 4},
                              {"RADIAL_FISHEYE", 5},
-                             {"THIN_PRISM_FISHEYE", 12, false}};
+                             {"THIN_PRISM_FISHEYE", 12, false},
+                             {"RAD_TAN_THIN_PRISM_FISHEYE", 16, false}};
 
 Error unknownModel(const std::string& model, const std::string& where) {
     return failAt(
@@ -311,6 +312,12 @@ Result<Model3d> readModel(const path& given, const Limits& limits) {
     STX_TRY(const auto imageBytes, readSetFile(m.file("images"), limits));
     STX_TRY(m.images, within(inQuotes(m.file("images").string()),
                              parseColmapImages(imageBytes, m.binary, limits)));
+    // The file's order is that of the numbers that COLMAP gave; people expect that of the names.
+    // Ours is that of the bundle.
+    if (!m.ours)
+        std::ranges::stable_sort(m.images, [](const ColmapImage& a, const ColmapImage& b) {
+            return numbersInOrder(a.name, b.name);
+        });
     return m;
 }
 
@@ -356,9 +363,6 @@ Result<std::vector<SetView>> colmapViews(const path& given, Job& job) {
         rememberNamedFile(m.base / "images" / image.name);
         views.push_back(std::move(view));
     }
-    // The file's order is that of the numbers that COLMAP gave; people expect that of the names.
-    std::stable_sort(views.begin(), views.end(),
-                     [](const SetView& a, const SetView& b) { return a.name < b.name; });
     return views;
 }
 

@@ -63,7 +63,7 @@ struct ImageSetOptions {
     std::string maskPattern;
     /// What pixels without depth are. Without a value: what the depth itself says (1e9 and more or
     /// infinity somewhere: nothing is there, 0 and NaN are not known), else empty where the picture
-    /// has transparent pixels or a mask, and unknown where it has none.
+    /// has transparent pixels or a mask and all that is opaque has depth, and unknown where not.
     std::optional<NoDepth> noDepth;
     /// Older Middlebury sets: focal length in pixels, and scene units from the first to the last
     /// view that has disparities; 0 = not given.
@@ -116,11 +116,11 @@ struct ImageSetKind {
 [[nodiscard]] Result<std::string> recogniseImageSet(const std::filesystem::path& path);
 
 /// Reads one frame of a set; of a set that moves frame 0, with a note, when none is asked for.
-/// Cameras are exact; lens distortion and skew are undone and rotations
-/// repaired, with a note of their size in pixels. Pixels without depth are what
-/// ImageSetOptions::noDepth says; nearPlane and farPlane of each view are fitted. Several views at
-/// a time, in the memory of one per thread beside the bundle. Errors: io, usage (an option that
-/// this kind needs or does not have), invalidInput with file and line or key.
+/// Cameras are exact; lens distortion and skew are undone (views have the pixels of a pinhole that
+/// the picture shows all of) and rotations repaired, with a note of their size in pixels. Pixels
+/// without depth are what ImageSetOptions::noDepth says; nearPlane and farPlane of each view are
+/// fitted. Several views at a time, in the memory of one per thread beside the bundle. Errors: io,
+/// usage (an option that this kind needs or does not have), invalidInput with file and line or key.
 [[nodiscard]] Result<Bundle> readImageSet(const std::filesystem::path& path,
                                           const ImageSetOptions& options, Job& job);
 

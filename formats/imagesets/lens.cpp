@@ -44,11 +44,46 @@ double Lens::largestShift(const Camera& c) const {
     return largest;
 }
 
-double Lens::cutShare(const Camera& c) const {
+bool Lens::isShown(const Camera& c, glm::dvec2 pixel) const {
+    const glm::dvec2 at = realFromIdeal(c, pixel);
+    return at.x >= 0 && at.y >= 0 && at.x < c.width && at.y < c.height;
+}
+
+PixelRectangle Lens::shownPart(const Camera& c) const {
+    PixelRectangle r{0, 0, c.width, c.height};
+    const auto missing = [&](int x, int y, glm::ivec2 step, int count) {
+        int outside = 0;
+        for (int i = 0; i < count; ++i)
+            outside += isShown(c, {x + i * step.x + 0.5, y + i * step.y + 0.5}) ? 0 : 1;
+        return static_cast<double>(outside) / count;
+    };
+    while (r.width > 0 && r.height > 0) {
+        const double left = missing(r.x, r.y, {0, 1}, r.height);
+        const double right = missing(r.x + r.width - 1, r.y, {0, 1}, r.height);
+        const double top = missing(r.x, r.y, {1, 0}, r.width);
+        const double bottom = missing(r.x, r.y + r.height - 1, {1, 0}, r.width);
+        const double most = std::max({left, right, top, bottom});
+        if (most == 0) break;
+        if (left == most || right == most) {
+            r.x += left == most ? 1 : 0;
+            --r.width;
+        } else {
+            r.y += top == most ? 1 : 0;
+            --r.height;
+        }
+    }
+    if (r.width <= 0 || r.height <= 0) return {};
+    if (c.width % 2 == 0 && r.width % 2 != 0) --r.width;
+    if (c.height % 2 == 0 && r.height % 2 != 0) --r.height;
+    return r.width > 0 && r.height > 0 ? r : PixelRectangle{};
+}
+
+double Lens::cutShare(const Camera& c, const PixelRectangle& part) const {
     constexpr int kCells = 256;
     double kept = 0;
     const auto real = [&](double i, double j) {
-        return realFromIdeal(c, {c.width * i / kCells, c.height * j / kCells});
+        return realFromIdeal(c,
+                             {part.x + part.width * i / kCells, part.y + part.height * j / kCells});
     };
     for (int j = 0; j < kCells; ++j) {
         for (int i = 0; i < kCells; ++i) {

@@ -8,6 +8,12 @@
 
 namespace stx::imagesets {
 
+/// A rectangle of whole pixels.
+struct PixelRectangle {
+    int x = 0, y = 0;  ///< its first pixel
+    int width = 0, height = 0;
+};
+
 /// What a real camera does to an ideal pinhole's picture. Coordinates as in OpenCV and COLMAP: x
 /// right, y down, of the plane at distance 1:
 /// x' = x (1 + k1 r2 + k2 r4 + k3 r6) + 2 p1 x y + p2 (r2 + 2 x x), y' alike; then the image point
@@ -32,9 +38,17 @@ struct Lens {
     [[nodiscard]] glm::dvec2 realFromIdeal(const Camera& camera, glm::dvec2 pixel) const;
     /// The largest shift over the picture, in pixels.
     [[nodiscard]] double largestShift(const Camera& camera) const;
-    /// The share 0..1 of the real picture's area that the ideal pinhole's picture of the same size
-    /// does not reach, so that it is cut away. Right to about 0.002; the lens must be invertible().
-    [[nodiscard]] double cutShare(const Camera& camera) const;
+    /// Whether the real picture, which has the camera's size, shows what the ideal pinhole sees at
+    /// a pixel position.
+    [[nodiscard]] bool isShown(const Camera& camera, glm::dvec2 pixel) const;
+    /// A large rectangle of the ideal pinhole's picture that the real one shows, all of it: what
+    /// lies around is not known. Its sides give way where most is missing. An even side stays even,
+    /// as films are coded so that all players take them. Width 0: there is none. The lens must be
+    /// invertible().
+    [[nodiscard]] PixelRectangle shownPart(const Camera& camera) const;
+    /// The share 0..1 of the real picture's area that is not in such a rectangle, so that it is cut
+    /// away. Right to about 0.002; the lens must be invertible().
+    [[nodiscard]] double cutShare(const Camera& camera, const PixelRectangle& kept) const;
     /// The mapping does not fold inside the picture: it can be undone.
     [[nodiscard]] bool invertible(const Camera& camera) const;
 };

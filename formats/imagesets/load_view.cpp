@@ -452,8 +452,9 @@ Result<void> matchSizes(const SetView& set, bool raise, StoredView& stored, Came
     return {};
 }
 
-/// Resamples picture and depth as a pinhole sees them.
-Result<void> undoLens(const SetView& set, const Camera& camera, StoredView& stored, Job& job) {
+/// Resamples picture and depth as a pinhole sees them. The camera becomes that of what the picture
+/// shows all of: what a pinhole sees around it is not known, and nothing may say that it is empty.
+Result<void> undoLens(const SetView& set, Camera& camera, StoredView& stored, Job& job) {
     if (!set.lens.invertible(camera))
         return failAt(fmt::format("camera '{}'", set.name), ErrorCode::invalidInput,
                       "the lens distortion folds the picture; k1 = {:g}, k2 = {:g}, k3 = {:g}, "
@@ -463,17 +464,35 @@ Result<void> undoLens(const SetView& set, const Camera& camera, StoredView& stor
     const char* what = !set.lens.distorts() ? "skew"
                        : set.lens.skew != 0 ? "lens distortion and skew"
                                             : "lens distortion";
-    const double cut = set.lens.cutShare(camera);
-    job.note(fmt::format(
-        "view '{}': {} of up to {:.2f} pixels undone by resampling{}", set.name, what, shift,
-        cut < kCutWorthTelling ? ""
-                               : fmt::format("; {:.0f} % of the picture lie outside a pinhole's of "
-                                             "the same focal length and size and are cut away",
-                                             100.0 * cut)));
-    auto [texture, depth] = undistort(stored.texture, stored.depth, camera, set.lens);
+    const PixelRectangle part = set.lens.shownPart(camera);
+    if (part.width <= 0)
+        return failAt(
+            fmt::format("camera '{}'", set.name), ErrorCode::invalidInput,
+            "the lens distortion moves all {}x{} pixels out of the picture; the middle is "
+            "expected to stay inside (see the principal point and the coefficients)",
+            camera.width, camera.height);
+    const double cut = set.lens.cutShare(camera, part);
+    const bool whole = part.width == camera.width && part.height == camera.height;
+    std::string away;
+    if (!whole)
+        away = fmt::format(
+            "; its border is cut off with {:.2g} % of the picture, as a pinhole sees "
+            "past the picture there: {}x{} of {}x{} pixels are left",
+            100.0 * cut, part.width, part.height, camera.width, camera.height);
+    else if (cut >= kCutWorthTelling)
+        away = fmt::format(
+            "; {:.0f} % of the picture lie outside a pinhole's of the same focal "
+            "length and size and are cut away",
+            100.0 * cut);
+    job.note(fmt::format("view '{}': {} of up to {:.2f} pixels undone by resampling{}", set.name,
+                         what, shift, away));
+    auto [texture, depth] = undistort(stored.texture, stored.depth, camera, set.lens, part);
     stored.texture = std::move(texture);
     stored.depth = std::move(depth);
-    stored.alpha = true;  // what lies outside the real picture is transparent
+    camera.cx -= part.x;
+    camera.cy -= part.y;
+    camera.width = part.width;
+    camera.height = part.height;
     return {};
 }
 

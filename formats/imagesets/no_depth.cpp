@@ -14,14 +14,11 @@ void withPixels(Texture& texture, const Work& work) {
         work(*texture.rgbaFloat(), 1.0f);
 }
 
-/// Distances from here on are those of nothing: Blender's is 1e10, others' infinity.
-constexpr float kNothing = 1e9f;
-
 /// Makes a picture transparent where its depth, which may be smaller, has the distance of nothing.
 /// Whether there was such a pixel.
 bool clearNothing(StoredView& stored) {
     const Image<float>& depth = stored.depth;
-    const auto nothing = [](float d) { return d >= kNothing; };
+    const auto nothing = [](float d) { return d >= kDistanceOfNothing; };
     if (std::ranges::none_of(depth.pixels(), nothing)) return false;
     withPixels(stored.texture, [&](auto& image, auto full) {
         for (int y = 0; y < image.height(); ++y) {
@@ -40,6 +37,34 @@ bool clearNothing(StoredView& stored) {
     });
     stored.alpha = true;
     return true;
+}
+
+/// Whether a pixel of the depth has no distance though all that the picture shows in it is fully
+/// opaque. The picture may be finer than its depth, and outlines then are inside pixels of depth.
+bool lacksDepthInside(StoredView& stored) {
+    const Image<float>& depth = stored.depth;
+    bool found = false;
+    withPixels(stored.texture, [&](const auto& image, auto full) {
+        // The first and the last pixel of the picture, by one axis, that one of depth touches.
+        const auto first = [](int at, int size, int of) {
+            return static_cast<int>(static_cast<std::int64_t>(at) * size / of);
+        };
+        const auto last = [](int at, int size, int of) {
+            return static_cast<int>((static_cast<std::int64_t>(at + 1) * size - 1) / of);
+        };
+        const int dw = depth.width(), dh = depth.height();
+        for (int y = 0; y < dh && !found; ++y) {
+            for (int x = 0; x < dw && !found; ++x) {
+                if (depth.at(x, y) > 0) continue;
+                bool opaque = true;
+                for (int j = first(y, image.height(), dh); j <= last(y, image.height(), dh); ++j)
+                    for (int i = first(x, image.width(), dw); i <= last(x, image.width(), dw); ++i)
+                        opaque = opaque && image.at(i, j).a == full;
+                found = opaque;
+            }
+        }
+    });
+    return found;
 }
 
 }  // namespace
@@ -67,7 +92,8 @@ NoDepth noDepthOf(const SetView& set, const ImageSetOptions& options, StoredView
             open = std::ranges::any_of(image.pixels(), [&](const auto& p) { return p.a < full; });
         });
     if (clearNothing(stored)) return NoDepth::unknown;
-    return open ? NoDepth::empty : NoDepth::unknown;
+    // What the picture shows is there: a sensor missed it, or stereo found nothing.
+    return open && !lacksDepthInside(stored) ? NoDepth::empty : NoDepth::unknown;
 }
 
 bool openEverywhere(const StoredView& stored) {
@@ -81,7 +107,7 @@ bool openEverywhere(const StoredView& stored) {
 
 void dropImpossible(Image<float>& distances) {
     for (float& d : distances.pixels())
-        if (!(d > 0 && d < kNothing)) d = kNoDepth;
+        if (!(d > 0 && d < kDistanceOfNothing)) d = kNoDepth;
 }
 
 }  // namespace stx::imagesets

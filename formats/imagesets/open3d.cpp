@@ -103,6 +103,31 @@ Result<std::optional<ToldIntrinsics>> toldIntrinsics(const path& folder, Job& jo
     return std::nullopt;
 }
 
+/// Scene units of a step of depth, by the `depth_scale` (steps in one unit) that Open3D writes
+/// beside the intrinsics; nothing: no file has one.
+Result<std::optional<double>> depthUnitBeside(const path& folder, Job& job) {
+    for (const std::string& name : filesIn(folder)) {
+        if (path(name).extension() != ".json") continue;
+        STX_TRY(const Json json, readJson(folder / name, job.limits));
+        if (!json.is_object() || !json.contains("intrinsic_matrix")) continue;
+        const std::string where = inQuotes((folder / name).string());
+        STX_TRY(const auto scale, findNumber(json, "depth_scale", where));
+        if (!scale) continue;
+        if (!(*scale > 0))
+            return failAt(where, ErrorCode::invalidInput,
+                          "'depth_scale' is {:g}; the steps of depth in one scene unit, above 0, "
+                          "are expected, or give --depth-unit",
+                          *scale);
+        if (1 / *scale != kMillimetre)
+            job.note(
+                fmt::format("{}: depth is in steps of {:g} scene units, as its depth_scale "
+                            "says; others with --depth-unit",
+                            where, 1 / *scale));
+        return 1 / *scale;
+    }
+    return std::nullopt;
+}
+
 /// Of pictures of this size: given, else told, else the usual ones.
 Result<PixelIntrinsics> intrinsicsOf(const path& folder, glm::ivec2 size,
                                      const ImageSetOptions& options, const std::string& where,
@@ -167,6 +192,11 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
     STX_CHECK(
         checkViewCount(poses.size() / static_cast<std::size_t>(options.every), job.limits, where));
     PixelIntrinsics k(0);
+    double unit = kMillimetre;
+    if (options.depthUnit == 0) {
+        STX_TRY(const auto found, depthUnitBeside(folder, job));
+        unit = found.value_or(kMillimetre);
+    }
     SetDescription set;
     std::optional<glm::ivec2> size;
     std::vector<bool> posed(colours.size(), false);
@@ -197,7 +227,7 @@ Result<SetDescription> describeOpen3d(const path& given, const ImageSetOptions& 
         v.width = size->x;
         v.height = size->y;
         view.camera = cameraFromVision(v);
-        view.distances = sensorsOrFloats(options, kMillimetre);
+        view.distances = sensorsOrFloats(options, unit);
         view.sensor = true;
         set.views.push_back(std::move(view));
     }

@@ -192,14 +192,13 @@ Texture resizeTexture(const Texture& texture, int width, int height) {
 }
 
 TextureAndDepth undistort(const Texture& texture, const Image<float>& depth, const Camera& camera,
-                          const Lens& lens) {
+                          const Lens& lens, const PixelRectangle& part) {
     return remap(
-        texture, depth, camera.width, camera.height, false,
+        texture, depth, part.width, part.height, false,
         [&](double x, double y) -> std::optional<glm::dvec2> {
-            const glm::dvec2 at = lens.realFromIdeal(camera, {x, y});
-            if (!(at.x >= 0 && at.y >= 0 && at.x < camera.width && at.y < camera.height))
-                return std::nullopt;
-            return at;
+            const glm::dvec2 ideal(part.x + x, part.y + y);
+            if (!lens.isShown(camera, ideal)) return std::nullopt;
+            return lens.realFromIdeal(camera, ideal);
         },
         [](double, double) { return 1.0; });
 }

@@ -16,9 +16,11 @@ using TextureAndDepth = std::pair<Texture, Image<float>>;
 
 [[nodiscard]] Texture resizeTexture(const Texture& texture, int width, int height);
 
-/// The picture that an ideal pinhole would have taken: `camera` without the lens.
+/// A part of the picture that an ideal pinhole would have taken: `camera` without the lens. What
+/// the real picture does not show is transparent and has no depth; see Lens::shownPart().
 [[nodiscard]] TextureAndDepth undistort(const Texture& texture, const Image<float>& depth,
-                                        const Camera& camera, const Lens& lens);
+                                        const Camera& camera, const Lens& lens,
+                                        const PixelRectangle& part);
 
 /// A cube face of a panorama whose depth is ray length; the face's depth is planar. `pose` is the
 /// panorama's camera.

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <queue>
 #include <tuple>
@@ -188,7 +190,41 @@ std::vector<std::pair<int, std::string>> numbered(const path& folder, const std:
     return out;
 }
 
-/// color/N, depth/N and a line for each in pose.txt.
+using PosesByNumber = std::map<std::int64_t, const TimedPose*>;
+
+/// Poses by the numbers that their lines begin with; empty: they have none, or times.
+PosesByNumber posesByNumber(const std::vector<TimedPose>& poses) {
+    constexpr double kMost = 1e9;  // seconds of a clock since 1970 are more
+    PosesByNumber out;
+    for (const TimedPose& pose : poses) {
+        if (!pose.timed || pose.time != std::floor(pose.time) || !(std::abs(pose.time) < kMost))
+            return {};
+        out.emplace(static_cast<std::int64_t>(pose.time), &pose);
+    }
+    return out;
+}
+
+/// What is added to a picture's number to get that of its pose; nothing: the lines do not begin
+/// with numbers of pictures. It is 0, but where pictures count from 0 and poses from 1, as
+/// ICL-NUIM's, or the other way round, or where no number is that of a picture.
+std::optional<std::int64_t> shiftToPoses(const std::vector<std::pair<int, std::string>>& pictures,
+                                         const PosesByNumber& poses) {
+    if (poses.empty()) return std::nullopt;
+    const auto found = [&](std::int64_t shift) {
+        return std::ranges::count_if(
+            pictures, [&](const auto& p) { return poses.contains(p.first + shift); });
+    };
+    const std::int64_t counted = poses.begin()->first - pictures.front().first;
+    const auto asTheyAre = found(0), shifted = found(counted);
+    const bool shifts = shifted > asTheyAre && (std::abs(counted) == 1 || asTheyAre == 0);
+    // Numbers of something else hit pictures by chance.
+    if (2 * std::max(asTheyAre, shifted) < static_cast<std::ptrdiff_t>(pictures.size()))
+        return std::nullopt;
+    return shifts ? counted : 0;
+}
+
+/// color/N, depth/N and a line for each in pose.txt: by the number that the line begins with, else
+/// the lines are those of the pictures from the first on, one for each number.
 Result<std::vector<Frame>> framesByNumber(const path& folder, const std::string& colourFolder,
                                           const std::string& trajectory, bool strict, Job& job) {
     STX_TRY(const auto poses, readTrajectory(folder, trajectory, strict, job));
@@ -200,19 +236,44 @@ Result<std::vector<Frame>> framesByNumber(const path& folder, const std::string&
                       "no {}/N.png was found in it; pictures and depth images are expected as "
                       "{}/N.png and depth/N.png, or rgb.txt and depth.txt with their times",
                       colours.empty() ? colourFolder : "depth", colourFolder);
+    const std::string poseWhere = inQuotes((folder / trajectory).string());
+    const PosesByNumber ofNumbers = posesByNumber(poses);
+    const auto shift = shiftToPoses(colours, ofNumbers);
+    const int first = colours.front().first, last = colours.back().first;
+    if (!shift && poses.size() > static_cast<std::size_t>(last - first) + 1)
+        job.note(
+            fmt::format("{}: {} poses for pictures {} to {}, and no numbers of pictures in its "
+                        "lines: the first pose is taken for picture {}",
+                        poseWhere, poses.size(), first, last, first));
     std::vector<Frame> frames;
+    std::size_t without = 0;
     for (const auto& [number, name] : colours) {
         const auto depth = std::find_if(depths.begin(), depths.end(),
                                         [&, n = number](auto& d) { return d.first == n; });
         if (depth == depths.end())
             return failAt(where, ErrorCode::io, "'{}' has no depth image of the same number", name);
-        const int line = number - colours.front().first;
-        if (line >= static_cast<int>(poses.size()))
-            return failAt(inQuotes((folder / trajectory).string()), ErrorCode::invalidInput,
-                          "{} poses, but there are images up to number {}", poses.size(),
-                          colours.back().first);
-        const TimedPose& pose = poses[static_cast<std::size_t>(line)];
-        if (!pose.lost) frames.push_back({static_cast<double>(number), name, depth->second, pose});
+        const TimedPose* pose = nullptr;
+        if (shift) {
+            const auto of = ofNumbers.find(number + *shift);
+            if (of != ofNumbers.end()) pose = of->second;
+        } else {
+            const auto line = static_cast<std::size_t>(number - first);
+            if (line >= poses.size())
+                return failAt(poseWhere, ErrorCode::invalidInput,
+                              "{} poses, but there are images up to number {}", poses.size(), last);
+            pose = &poses[line];
+        }
+        without += pose ? 0 : 1;
+        if (pose && !pose->lost)
+            frames.push_back({static_cast<double>(number), name, depth->second, *pose});
+    }
+    if (without > 0) {
+        const std::string found =
+            fmt::format("{} of {} pictures {} no pose of {} number", without, colours.size(),
+                        without == 1 ? "has" : "have", without == 1 ? "its" : "their");
+        if (strict) return failAt(poseWhere, ErrorCode::invalidInput, "{}", found);
+        job.note(
+            fmt::format("{}: {} and {} left out", poseWhere, found, without == 1 ? "is" : "are"));
     }
     return frames;
 }
@@ -278,6 +339,7 @@ Result<std::vector<TimedPose>> parseTrajectory(std::string_view text) {
         pose.time = static_cast<double>(poses.size());
         if (first == 1) {
             STX_TRY(pose.time, numberOf(words[0], line.where()));
+            pose.timed = true;
         }
         const bool noTurn = n[3] == 0 && n[4] == 0 && n[5] == 0 && n[6] == 0;
         pose.lost = noTurn || !isTracked(n);

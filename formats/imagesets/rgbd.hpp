@@ -16,7 +16,8 @@ struct TimedPose {
     double time = 0;  ///< seconds, or a frame's number; the line's, when the file has neither
     glm::dvec3 position{0.0};
     glm::dquat orientation{1, 0, 0, 0};
-    bool lost = false;  ///< tracking was: there is a time only
+    bool lost = false;   ///< tracking was: there is a time only
+    bool timed = false;  ///< its line begins with a time or a number
 };
 
 /// Lines `t tx ty tz qx qy qz qw`, or without t. Those with nan, inf or a quaternion of 0 are lost.

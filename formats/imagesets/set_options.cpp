@@ -82,6 +82,17 @@ const std::vector<SetOption>& setOptions() {
     return all;
 }
 
+/// Integers of more than 8 bits alone; `expected` says what else may be.
+Distances moreThan8Bits(Distances integers, std::string_view expected) {
+    return [integers = std::move(integers), expected](Image<float>& values, const Camera& camera,
+                                                      int largest, Job& job) -> Result<void> {
+        if (largest <= 255)
+            return fail(ErrorCode::invalidInput, "the depth has {} bits; {}",
+                        std::bit_width(static_cast<unsigned>(largest)), expected);
+        return integers(values, camera, largest, job);
+    };
+}
+
 }  // namespace
 
 Result<void> checkOptionsOf(std::string_view kind, const ImageSetOptions& options,
@@ -114,21 +125,18 @@ Distances orFloats(const ImageSetOptions& options, Distances integers) {
 }
 
 Distances sensorsOrFloats(const ImageSetOptions& options, double usual) {
-    return orFloats(options, sensorIntegers(options.depthUnit > 0 ? options.depthUnit : usual));
+    if (options.depthUnit > 0) return orFloats(options, sensorIntegers(options.depthUnit));
+    return orFloats(options,
+                    moreThan8Bits(sensorIntegers(usual),
+                                  "16 or floats are expected; where it is distances all the same, "
+                                  "give their step with --depth-unit"));
 }
 
-Distances integersOrFloats(const ImageSetOptions& options, std::optional<double> named) {
+Distances integersOrFloats(const ImageSetOptions& options, std::optional<double> named,
+                           double usual) {
     if (options.depthUnit > 0) named = options.depthUnit;
-    const Distances integers = named ? scaledIntegers(*named) : sensorIntegers(kMillimetre);
-    const auto of16Bits = [integers](Image<float>& values, const Camera& camera, int largest,
-                                     Job& job) -> Result<void> {
-        if (largest <= 255)
-            return fail(ErrorCode::invalidInput,
-                        "the depth has {} bits; 16 (millimetres) or floats are expected",
-                        std::bit_width(static_cast<unsigned>(largest)));
-        return integers(values, camera, largest, job);
-    };
-    return orFloats(options, of16Bits);
+    const Distances integers = named ? scaledIntegers(*named) : sensorIntegers(usual);
+    return orFloats(options, moreThan8Bits(integers, "16 (millimetres) or floats are expected"));
 }
 
 }  // namespace stx::imagesets

@@ -25,12 +25,14 @@ inline constexpr std::string_view kFilms = "films", kCalibrated = "middlebury wi
 [[nodiscard]] Distances orFloats(const ImageSetOptions& options, Distances integers);
 
 /// Of sensors, sensorIntegers() in steps of --depth-unit, else of `usual`, or floats.
+/// Errors: (invalidInput) 8 bits without --depth-unit: they are no steps of `usual`, but a picture
+/// to look at; as orFloats().
 [[nodiscard]] Distances sensorsOrFloats(const ImageSetOptions& options, double usual);
 
 /// Of sets that hold integers of 16 bits or floats. The integers are steps of --depth-unit, else of
-/// the unit that the set names, else millimetres of a sensor.
+/// the unit that the set names, else a sensor's in steps of `usual`.
 /// Errors: (invalidInput) 8 bits; (usage) floats, and --depth-unit is given.
 [[nodiscard]] Distances integersOrFloats(const ImageSetOptions& options,
-                                         std::optional<double> named);
+                                         std::optional<double> named, double usual = kMillimetre);
 
 }  // namespace stx::imagesets

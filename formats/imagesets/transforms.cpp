@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <string_view>
+#include <utility>
 
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
+#include "formats/imagesets/no_depth.hpp"
 #include "formats/imagesets/poses.hpp"
 #include "formats/imagesets/set_options.hpp"
 #include "lib/base/parallel.hpp"
@@ -197,20 +199,75 @@ Result<std::optional<Distances>> codedDistances(const Json& file, const std::str
     return normalisedDisparity(*nearest, *farthest, none.has_value());
 }
 
+/// What a file says of the steps of its depth, in scene units.
+struct DepthUnit {
+    std::optional<double> named;     ///< of integers
+    std::optional<double> ofArrays;  ///< what arrays of floats are multiplied by
+    double usual = kMillimetre;      ///< of integers, where it names none
+    double applied = 1;              ///< what of these is its applied_scale
+};
+
+/// nerfstudio counts poses that were scaled before (applied_scale), and multiplies depth as it was
+/// stored, arrays of floats too, by depth_unit_scale_factor and by that
+/// (get_depth_image_from_path() with the scale of its dataparser). integer_depth_scale is in units
+/// of the poses.
+Result<DepthUnit> depthUnitOf(const Json& file, const std::string& where) {
+    DepthUnit out;
+    STX_TRY(out.named, within(where, findNumber(file, "integer_depth_scale", "")));
+    STX_TRY(const auto factor, within(where, findNumber(file, "depth_unit_scale_factor", "")));
+    STX_TRY(const auto applied, within(where, findNumber(file, "applied_scale", "")));
+    for (const auto& scale : {out.named, factor})
+        if (scale && !(*scale > 0))
+            return failAt(where, ErrorCode::invalidInput,
+                          "the depth's scale is {:g}; it must be above 0", *scale);
+    if (applied && !(*applied > 0))
+        return failAt(where, ErrorCode::invalidInput, "'applied_scale' is {:g}; it must be above 0",
+                      *applied);
+    if (out.named) return out;
+    out.applied = applied.value_or(1.0);
+    out.usual *= out.applied;
+    if (factor) out.named = out.ofArrays = *factor * out.applied;
+    return out;
+}
+
+/// Of `others`, with a note about what an applied_scale did to integers.
+Distances notedScale(Distances others, double applied, const std::string& where) {
+    return [others = std::move(others), applied, where](Image<float>& values, const Camera& camera,
+                                                        int largest, Job& job) -> Result<void> {
+        if (largest > 0)
+            job.noteOnce(
+                fmt::format("{}: depth is taken times {:g}, its applied_scale, as its "
+                            "poses are; --depth-unit is in place of that",
+                            where, applied));
+        return others(values, camera, largest, job);
+    };
+}
+
+/// Of arrays: those of floats are multiplied by `unit`.
+Distances arraysInUnits(Distances others, double unit, const std::string& where) {
+    return [others = std::move(others), unit, where](Image<float>& values, const Camera& camera,
+                                                     int largest, Job& job) -> Result<void> {
+        STX_CHECK(others(values, camera, largest, job));
+        if (largest > 0) return {};
+        job.noteOnce(
+            fmt::format("{}: arrays of depth are taken times {:g}, as its "
+                        "depth_unit_scale_factor says; leave it out where they are in "
+                        "scene units",
+                        where, unit));
+        for (float& v : values.pixels())
+            if (v < kDistanceOfNothing) v = static_cast<float>(v * unit);
+        return {};
+    };
+}
+
 }  // namespace
 
 Result<std::optional<Distances>> transformsDistances(const Json& file, const std::string& where) {
     STX_TRY(const auto coded, codedDistances(file, where));
     if (coded) return coded;
-    STX_TRY(auto unit, within(where, findNumber(file, "integer_depth_scale", "")));
-    if (!unit) {
-        STX_TRY(unit, within(where, findNumber(file, "depth_unit_scale_factor", "")));
-    }
-    if (!unit) return std::nullopt;
-    if (!(*unit > 0))
-        return failAt(where, ErrorCode::invalidInput,
-                      "the depth's scale is {:g}; it must be above 0", *unit);
-    return scaledIntegers(*unit);
+    STX_TRY(const auto unit, depthUnitOf(file, where));
+    if (!unit.named) return std::nullopt;
+    return scaledIntegers(*unit.named);
 }
 
 Result<std::vector<SetView>> transformsViews(const Json& file, Job& job) {
@@ -263,19 +320,18 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
     STX_TRY(set.origin, originOf(json, where));
     STX_TRY(set.end, within(where, findNumber(json, "stx:end", "")));
     STX_TRY(set.environment, environmentOf(json, folder, where, job.limits));
-    STX_TRY(auto scale, within(where, findNumber(json, "integer_depth_scale", "")));
-    if (!scale) {
-        STX_TRY(scale, within(where, findNumber(json, "depth_unit_scale_factor", "")));
-    }
-    if (scale && !(*scale > 0))
-        return failAt(where, ErrorCode::invalidInput,
-                      "the depth's scale is {:g}; it must be above 0", *scale);
+    STX_TRY(const DepthUnit unit, depthUnitOf(json, where));
     STX_TRY(const auto coded, codedDistances(json, where));
     if (coded && options.depthUnit > 0)
         return failAt(where, ErrorCode::usage,
                       "its depth is not in steps of a distance, as 'depth_coding' says; leave out "
                       "--depth-unit");
-    const Distances distances = coded ? *coded : integersOrFloats(options, scale);
+    Distances distances = coded ? *coded : integersOrFloats(options, unit.named, unit.usual);
+    if (!coded && unit.applied != 1 && options.depthUnit == 0)
+        distances = notedScale(std::move(distances), unit.applied, where);
+    const Distances ofArrays = !coded && unit.ofArrays.value_or(1) != 1
+                                   ? arraysInUnits(distances, *unit.ofArrays, where)
+                                   : distances;
     const Json& frames = json["frames"];
     const auto describe = [&](std::size_t i) -> Result<void> {
         SetView& view = set.views[i];
@@ -301,7 +357,8 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
             STX_TRY(view.mask, sourceInside(folder, *mask, place, job.limits));
             if (!view.missing) view.missing = view.mask.missing;
         }
-        view.distances = distances;
+        const auto ending = path(*depth).extension();
+        view.distances = ending == ".npy" || ending == ".npz" ? ofArrays : distances;
         return {};
     };
     // Long films have tens of thousands of files to look for.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -15,8 +17,6 @@ namespace stx {
 namespace registration {
 namespace {
 
-/// The fewest points of a pair that tell.
-constexpr std::size_t kFewestPoints = 30;
 /// What counts as one surface when views are drawn, a share of the distance (kSame of
 /// shaders/shared/surface_constants.glsl, kSameDepth of lib/render/splat), or of a pixel's width if
 /// that is more. Exact cases of tests/sweep come to 0.03 of that width. With one camera moved
@@ -61,6 +61,27 @@ ViewDisagreement ofView(int view, const std::vector<Pair>& pairs,
     return out;
 }
 
+/// Views that see past most others, or are seen past by them: one whose depth is too far sees past
+/// what others show, and one whose depth is too near has points before it. Either way it is one of
+/// the two in most of its pairs, and the others each in a pair with it alone.
+std::vector<bool> apartFromMost(std::size_t views, const std::vector<SeenPast>& past) {
+    std::map<std::pair<int, int>, bool> pairs;
+    for (const SeenPast& p : past) {
+        bool& most = pairs[std::minmax(p.from, p.to)];
+        most = most || p.most;
+    }
+    std::vector<int> others(views, 0), apart(views, 0);
+    for (const auto& [pair, most] : pairs) {
+        for (const int v : {pair.first, pair.second}) {
+            ++others[static_cast<std::size_t>(v)];
+            apart[static_cast<std::size_t>(v)] += most ? 1 : 0;
+        }
+    }
+    std::vector<bool> out(views);
+    for (std::size_t v = 0; v < views; ++v) out[v] = 2 * apart[v] > others[v];
+    return out;
+}
+
 }  // namespace
 
 OfPair measurePair(const GridOfPoints& from, const ViewHeader& own, const DepthView& to,
@@ -86,7 +107,7 @@ OfPair measurePair(const GridOfPoints& from, const ViewHeader& own, const DepthV
 }
 
 DepthDisagreement disagreement(std::span<const DepthView> views, const std::vector<Pair>& pairs,
-                               const OverlapSettings& settings) {
+                               const OverlapSettings& settings, const std::vector<SeenPast>& past) {
     std::vector<OfPair> found(pairs.size());
     parallelFor(0, pairs.size(), [&](std::size_t i) {
         const Pair& pair = pairs[i];
@@ -94,11 +115,12 @@ DepthDisagreement disagreement(std::span<const DepthView> views, const std::vect
         found[i] = measurePair(gridOfPoints(*from.depth, kMeasured), *from.header, views[pair.to],
                                settings.overlapTolerance);
     });
-    return togetherOf(pairs, found, views.size());
+    return togetherOf(pairs, found, views.size(), past, settings);
 }
 
 DepthDisagreement togetherOf(const std::vector<Pair>& pairs, const std::vector<OfPair>& found,
-                             std::size_t views) {
+                             std::size_t views, const std::vector<SeenPast>& past,
+                             const OverlapSettings& settings) {
     DepthDisagreement result;
     std::vector<double> values;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -111,6 +133,9 @@ DepthDisagreement togetherOf(const std::vector<Pair>& pairs, const std::vector<O
     result.relative = medianOf(std::move(values));
     for (std::size_t v = 0; v < views; ++v)
         result.views.push_back(ofView(static_cast<int>(v), pairs, found));
+    const std::vector<bool> apart = apartFromMost(views, past);
+    for (std::size_t v = 0; v < views; ++v)
+        if (apart[v]) result.views[v].beyond = settings.overlapTolerance;
     return result;
 }
 
@@ -128,8 +153,9 @@ std::vector<DepthView> depthViewsOf(const Bundle& bundle) {
 
 DepthDisagreement measureDepthDisagreement(std::span<const DepthView> views,
                                            const OverlapSettings& settings) {
-    return registration::disagreement(views, registration::overlappingPairs(views, settings),
-                                      settings);
+    std::vector<registration::SeenPast> past;
+    const auto pairs = registration::overlappingPairs(views, settings, &past);
+    return registration::disagreement(views, pairs, settings, past);
 }
 
 DepthDisagreement measureDepthDisagreement(const Bundle& bundle, const OverlapSettings& settings) {
@@ -143,13 +169,21 @@ std::optional<std::string> disagreementNote(const Bundle& bundle, const DepthDis
     for (std::size_t v = 0; v < found.views.size(); ++v)
         if (found.views[v].disagrees()) worst.push_back(v);
     if (worst.empty()) return {};
-    std::ranges::stable_sort(worst, [&](std::size_t a, std::size_t b) {
-        return found.views[a].relative > found.views[b].relative;
-    });
+    const auto by = [&](std::size_t v) {
+        return std::max(found.views[v].relative, found.views[v].beyond);
+    };
+    std::ranges::stable_sort(worst, [&](std::size_t a, std::size_t b) { return by(a) > by(b); });
     std::string names;
     for (std::size_t i = 0; i < std::min(kNamed, worst.size()); ++i)
-        names += fmt::format("{}'{}' by {:.2g} %", i > 0 ? ", " : "", bundle.views[worst[i]].name,
-                             100 * found.views[worst[i]].relative);
+        names +=
+            fmt::format("{}'{}' by {}{:.2g} %", i > 0 ? ", " : "", bundle.views[worst[i]].name,
+                        found.views[worst[i]].beyond > 0 ? "more than " : "", 100 * by(worst[i]));
+    // One that is far off may have nothing in common with any.
+    double oneSurface = found.views[worst.front()].oneSurface;
+    for (const ViewDisagreement& view : found.views)
+        if (found.views[worst.front()].oneSurface == 0)
+            oneSurface = std::max(oneSurface, view.oneSurface);
+    if (oneSurface == 0) oneSurface = registration::kSameShare;
     if (worst.size() > kNamed) names += fmt::format(" and {} more", worst.size() - kNamed);
     const std::string help =
         aligned ? "other poses did not help: their depth is off, or has another scale or lens than "
@@ -161,8 +195,7 @@ std::optional<std::string> disagreementNote(const Bundle& bundle, const DepthDis
         "surface "
         "({:.2g} %): {}; edges may show twice; {}",
         worst.size(), counted(found.views.size(), "view"), worst.size() == 1 ? "s" : "",
-        worst.size() == 1 ? "it" : "them", 100 * found.views[worst.front()].oneSurface, names,
-        help);
+        worst.size() == 1 ? "it" : "them", 100 * oneSurface, names, help);
 }
 
 }  // namespace stx

@@ -21,7 +21,7 @@ struct DepthView {
 
 struct OverlapSettings {
     /// Two points are taken for the same surface when their distances differ by less than this
-    /// share. What is to be found must stay below it.
+    /// share. What differs by more is in front or behind, or disagrees: ViewDisagreement::beyond.
     double overlapTolerance = 0.1;
     /// Pairs with a smaller overlap, as a share of either image, are left out.
     double minOverlap = 0.05;
@@ -37,8 +37,12 @@ struct ViewDisagreement {
     double oneSurface = 0;  ///< what of that counts as one surface
     int farthest = -1;      ///< the partner it disagrees with most, by index; -1: it has none
     double farthestBy = 0;  ///< by how much
+    /// Not 0: it disagrees by more than this share, too much to compare points. With most of the
+    /// views that have surfaces where it has points, or the other way round, one of the two sees
+    /// past most of what the other shows.
+    double beyond = 0;
 
-    [[nodiscard]] bool disagrees() const { return relative > oneSurface; }
+    [[nodiscard]] bool disagrees() const { return relative > oneSurface || beyond > 0; }
 };
 
 struct DepthDisagreement {

@@ -27,7 +27,8 @@ struct DisagreementByView::State {
     std::vector<std::vector<std::size_t>> lookFor;
     std::once_flag known;  ///< `lookFor` is
     std::size_t left = 0;  ///< that compare() has not had yet
-    std::mutex mutex;      ///< of `pairs`, `compared` and `left`
+    std::vector<registration::SeenPast> past;
+    std::mutex mutex;  ///< of `pairs`, `compared`, `past` and `left`
 
     /// Where a pair comes among those of its view: as overlappingPairs() sorts them.
     static bool before(const Pair& a, const Pair& b) {
@@ -75,10 +76,13 @@ bool DisagreementByView::compare(std::size_t index, const Image<float>& depth,
         const ViewHeader& own = bundle.views[i];
         if (own.background != to.header->background) continue;
         State::OfView& from = state.views[i];
-        const Pair pair{
-            static_cast<int>(i), static_cast<int>(index),
-            registration::commonPoints(from.probes, own.camera, to, state.settings.overlapTolerance)
-                .overlap()};
+        const auto common = registration::commonPoints(from.probes, own.camera, to,
+                                                       state.settings.overlapTolerance);
+        const Pair pair{static_cast<int>(i), static_cast<int>(index), common.overlap()};
+        {
+            const std::lock_guard lock(state.mutex);
+            registration::addSeenPast(pair.from, pair.to, common, state.settings, state.past);
+        }
         if (!(pair.overlap >= state.settings.minOverlap)) continue;
         {
             const std::lock_guard lock(state.mutex);
@@ -108,7 +112,8 @@ DepthDisagreement DisagreementByView::result() const {
             found.push_back(ofPair);
         }
     }
-    return registration::togetherOf(pairs, found, state_->views.size());
+    return registration::togetherOf(pairs, found, state_->views.size(), state_->past,
+                                    state_->settings);
 }
 
 Result<DepthDisagreement> measureDepthDisagreement(const ViewTable& table, Job& job) {

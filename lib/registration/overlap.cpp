@@ -94,9 +94,12 @@ CommonPoints commonPoints(const GridOfPoints& from, const Camera& own, const Dep
         if (!(inTarget.z < 0)) continue;
         const glm::dvec3 at = other.project(inTarget);
         const auto there = sampleDepth(*to.depth, at.x, at.y);
-        if (!there || !(std::abs(at.z - there->distance) < tolerance * at.z)) continue;
+        if (!there || !p.onSurface) continue;
         const DepthSample surface{p.own, {p.right - p.own, p.below - p.own}};
-        if (!p.onSurface || !seesTheSameSide(own, p.x + 0.5, p.y + 0.5, surface, otherEye) ||
+        if (!seesTheSameSide(own, p.x + 0.5, p.y + 0.5, surface, otherEye)) continue;
+        ++out.faced;
+        out.past += there->distance - at.z >= tolerance * at.z ? 1 : 0;
+        if (!(std::abs(at.z - there->distance) < tolerance * at.z) ||
             !seesTheSameSide(other, at.x, at.y, *there, ownEye))
             continue;
         out.points.push_back({p.own, at.z, there->distance, bentBetween(*to.depth, at.x, at.y)});
@@ -123,10 +126,19 @@ int probesAmong(std::size_t views) {
     return views < kMany ? kProbes : kProbesOfMany;
 }
 
+void addSeenPast(int from, int to, const CommonPoints& common, const OverlapSettings& settings,
+                 std::vector<SeenPast>& past) {
+    if (common.faced < static_cast<int>(kFewestPoints) ||
+        common.faced < settings.minOverlap * common.asked)
+        return;
+    past.push_back({from, to, 2 * common.past > common.faced});
+}
+
 std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
-                                   const OverlapSettings& settings) {
+                                   const OverlapSettings& settings, std::vector<SeenPast>* past) {
     const int count = static_cast<int>(views.size());
     std::vector<std::vector<Pair>> ofView(views.size());
+    std::vector<std::vector<SeenPast>> pastOfView(views.size());
     parallelFor(0, count, [&](std::int64_t i) {
         const DepthView& from = views[i];
         auto& pairs = ofView[i];
@@ -138,8 +150,10 @@ std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
                  kMostCompared)) {
             const DepthView& to = views[j];
             if (to.header->background != from.header->background) continue;
-            const double overlap =
-                commonPoints(grid, from.header->camera, to, settings.overlapTolerance).overlap();
+            const CommonPoints common =
+                commonPoints(grid, from.header->camera, to, settings.overlapTolerance);
+            addSeenPast(static_cast<int>(i), static_cast<int>(j), common, settings, pastOfView[i]);
+            const double overlap = common.overlap();
             if (overlap >= settings.minOverlap)
                 pairs.push_back({static_cast<int>(i), static_cast<int>(j), overlap});
         }
@@ -150,6 +164,8 @@ std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
     });
     std::vector<Pair> all;
     for (auto& pairs : ofView) all.insert(all.end(), pairs.begin(), pairs.end());
+    if (past)
+        for (const auto& of : pastOfView) past->insert(past->end(), of.begin(), of.end());
     return all;
 }
 

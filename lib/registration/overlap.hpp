@@ -51,12 +51,25 @@ struct CommonPoints {
         double bent;   ///< by how much that may be off, where its surface bends between pixels
     };
     int asked = 0;  ///< pixels of the grid that have a point
+    int faced = 0;  ///< of these whose side the other one would see, where it has a surface
+    /// Of these that are before that surface, by a larger share than the tolerance: the other one
+    /// sees past them, which nothing in front of them can explain.
+    int past = 0;
     std::vector<CommonPoint> points;
 
     [[nodiscard]] double overlap() const {
         return asked > 0 ? static_cast<double>(points.size()) / asked : 0;
     }
 };
+/// Two views, by index, of which one has points where the other has surfaces.
+struct SeenPast {
+    int from = 0;
+    int to = 0;
+    bool most = false;  ///< `to` sees past more than half of them
+};
+/// The fewest points of a pair that say something.
+inline constexpr std::size_t kFewestPoints = 30;
+
 /// Points of the grid of a view with that camera that are apart by a larger share than `tolerance`,
 /// or that are seen from the other side, are not the same.
 [[nodiscard]] CommonPoints commonPoints(const GridOfPoints& from, const Camera& own,
@@ -86,18 +99,26 @@ struct OfPair {
 /// `from`: the grid of kMeasured of a view with that header.
 [[nodiscard]] OfPair measurePair(const GridOfPoints& from, const ViewHeader& own,
                                  const DepthView& to, double tolerance);
-/// Of pairs in the order of overlappingPairs(), and as many views.
+/// Adds what the common points of two views say of that, if they are enough.
+void addSeenPast(int from, int to, const CommonPoints& common, const OverlapSettings& settings,
+                 std::vector<SeenPast>& past);
+/// Of pairs in the order of overlappingPairs(), and as many views; `past` in any order.
 [[nodiscard]] DepthDisagreement togetherOf(const std::vector<Pair>& pairs,
-                                           const std::vector<OfPair>& found, std::size_t views);
+                                           const std::vector<OfPair>& found, std::size_t views,
+                                           const std::vector<SeenPast>& past,
+                                           const OverlapSettings& settings);
 
 /// Pairs of overlapping views, both directions, in order of `from`, the widest overlaps first. Each
-/// is looked for in kMostCompared others at most: viewsThatMayShow().
+/// is looked for in kMostCompared others at most: viewsThatMayShow(). `past` gets what these say of
+/// each other.
 [[nodiscard]] std::vector<Pair> overlappingPairs(std::span<const DepthView> views,
-                                                 const OverlapSettings& settings);
+                                                 const OverlapSettings& settings,
+                                                 std::vector<SeenPast>* past = nullptr);
 
 /// What the pairs and their views disagree by.
 [[nodiscard]] DepthDisagreement disagreement(std::span<const DepthView> views,
                                              const std::vector<Pair>& pairs,
-                                             const OverlapSettings& settings);
+                                             const OverlapSettings& settings,
+                                             const std::vector<SeenPast>& past = {});
 
 }  // namespace stx::registration

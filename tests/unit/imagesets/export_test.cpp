@@ -47,6 +47,40 @@ INSTANTIATE_TEST_SUITE_P(All, Export,
                          ::testing::Combine(::testing::Values(Kind::transforms, Kind::miv),
                                             ::testing::Values(8, 16, 32), ::testing::Bool()));
 
+/// COLMAP has no mark for it: what is opaque without depth says it.
+TEST(Export, CutOutsOfColmapKeepWhatIsNotKnown) {
+    Bundle bundle = smallBundle(2, 32, false, false);
+    std::erase_if(bundle.views, [](const ReferenceView& v) { return v.camera.orthographic; });
+    ASSERT_FALSE(bundle.views.empty());
+    ReferenceView& view = bundle.views[0];
+    view.name = "cut";
+    view.noDepth = NoDepth::unknown;
+    int hole = -1;
+    for (int i = 0; i < static_cast<int>(view.depth.count()); ++i) {
+        const bool point = hasPoint(view.depth.data()[i]);
+        view.texture.rgba8()->data()[i].a = point ? 255 : 0;
+        if (point) hole = i;
+    }
+    ASSERT_GE(hole, 0);
+    view.depth.data()[hole] = kNoDepth;
+    view.texture.rgba8()->data()[0].a = 0;
+    view.depth.data()[0] = kNoDepth;
+    ASSERT_NE(hole, 0);
+    TemporaryFolder folder;
+    Job job;
+    ExportOptions options;
+    options.kind = Kind::colmap;
+    const auto written = exportViews(*viewsOf(bundle), folder / "set", options, job);
+    ASSERT_TRUE(written) << written.error().text();
+    ImageSetOptions reading;
+    reading.refine = *RefineSettings::from("off");
+    const auto back = readImageSet(folder / "set", reading, job);
+    ASSERT_TRUE(back) << back.error().text();
+    EXPECT_EQ(back->views[0].noDepth, NoDepth::unknown);
+    EXPECT_EQ(back->views[0].texture.alpha(static_cast<std::size_t>(hole)), 1.0f);
+    EXPECT_EQ(back->views[0].texture.alpha(0), 0.0f);
+}
+
 /// What other programs see: the same points without the keys that only we know, for perspective
 /// and orthographic cameras with principal points off the middle, and for masks.
 TEST(Export, ComesBackWithoutOurOwnKeys) {

@@ -4,6 +4,7 @@
 
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/images/npy.hpp"
+#include "formats/imagesets/camera_file.hpp"
 #include "formats/imagesets/lens.hpp"
 #include "formats/imagesets/msr.hpp"
 #include "formats/imagesets/panorama.hpp"
@@ -133,6 +134,46 @@ TEST(Colmap, OnlyCamerasInUseMatter) {
         std::filesystem::rename(folder / "sparse" / name, folder / "sparse/0" / name);
     EXPECT_EQ(recogniseImageSet(folder / "sparse").value_or(""), "colmap");
     EXPECT_TRUE(readSet(folder / "sparse"));
+}
+
+/// Those of binary models, too, of which the number of parameters must be known.
+TEST(Colmap, UnusedCamerasOfNewerModelsAreReadOver) {
+    const auto views = roomViews(1);
+    TemporaryFolder folder;
+    writeColmap(folder.path(), views, true);
+    const auto bytes = readFile(folder / "sparse/cameras.bin", {});
+    ASSERT_TRUE(bytes);
+    std::string text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    text.replace(0, 8, little(2, 8));
+    constexpr int kRadTanThinPrismFisheye = 11, kParameters = 16;
+    text += little(99, 4) + little(kRadTanThinPrismFisheye, 4) + little(96, 8) + little(64, 8);
+    for (int i = 0; i < kParameters; ++i) text += doubles({i < 4 ? 50.0 : 0.0});
+    writeText(folder / "sparse/cameras.bin", text);
+    const auto read = readSet(folder.path(), keepAll());
+    ASSERT_TRUE(read) << read.error().text();
+    expectSame(views[0], read->views[0]);
+}
+
+/// Views of a set and pictures of its cameras come in one order, whatever numbers COLMAP gave.
+TEST(Colmap, ViewsAndCamerasAreInTheOrderOfNumbersInNames) {
+    auto views = roomViews(3);
+    views[0].name = "frame10";
+    views[1].name = "frame2";
+    views[2].name = "frame1";
+    TemporaryFolder folder;
+    writeColmap(folder.path(), views, true);
+    const auto read = readSet(folder.path(), keepAll());
+    ASSERT_TRUE(read) << read.error().text();
+    Job job;
+    const auto cameras = readCameraFile(folder.path(), job);
+    ASSERT_TRUE(cameras) << cameras.error().text();
+    ASSERT_EQ(read->views.size(), 3u);
+    ASSERT_EQ(cameras->size(), 3u);
+    const char* names[3] = {"frame1", "frame2", "frame10"};
+    for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_EQ(read->views[i].name, names[i]);
+        EXPECT_EQ(cameras->at(i).name, names[i]);
+    }
 }
 
 TEST(Msr, CheckValues) {

@@ -242,6 +242,56 @@ TEST(LostTracking, OfPosesByNumberLeavesTheirFrameOut) {
     EXPECT_EQ((*read).views[1].camera.position.x, 3);
 }
 
+/// Lines that begin with the numbers of pictures: a tracker that lost one writes no line for it,
+/// and a part of a recording has the poses of all of it. They were counted from the first.
+TEST(LostTracking, PosesOfNumbersAreThoseOfTheirPictures) {
+    struct Case {
+        std::vector<int> pictures, poses;
+        int shift;  ///< from a picture's number to its pose's
+        std::vector<int> left;
+        const char* note;
+        bool numbers = true;
+    };
+    const Case cases[] = {
+        {{0, 1, 2, 3}, {0, 1, 3, 4, 5}, 0, {0, 1, 3}, "1 of 4 pictures has no pose of its number"},
+        {{3, 4, 5}, {0, 1, 2, 3, 5, 6}, 0, {3, 5}, "1 of 3 pictures has no pose"},
+        {{0, 1, 2}, {1, 2, 3}, 1, {0, 1, 2}, ""},
+        {{1, 2, 3}, {0, 1, 2}, -1, {1, 2, 3}, ""},
+        {{0, 1, 2}, {1, 2}, 0, {1, 2}, "1 of 3 pictures has no pose"},
+        {{40, 41}, {0, 1}, -40, {40, 41}, ""},
+        {{3, 4}, {0, 1, 2, 3, 4}, -3, {3, 4}, "5 poses for pictures 3 to 4", false}};
+    const auto view = roomViews(1)[0];
+    for (const Case& c : cases) {
+        SCOPED_TRACE(fmt::format("pictures from {}, poses from {}", c.pictures[0], c.poses[0]));
+        const TemporaryFolder folder;
+        for (const int i : c.pictures) {
+            writeColour(folder / fmt::format("color/{}.png", i), view);
+            writeCodes(folder / fmt::format("depth/{}.png", i), 96, 64, 16,
+                       [](int, int) { return 9000; });
+        }
+        writeText(folder / "intrinsics.txt", "60 60 47.5 31.5\n");
+        std::string lines;
+        for (const int i : c.poses)
+            lines += fmt::format("{}{} 0 0 0 0 0 1\n", c.numbers ? fmt::format("{} ", i) : "", i);
+        writeText(folder / "pose.txt", lines);
+        ImageSetOptions options;
+        options.refine = *RefineSettings::from("off");
+        Job job;
+        const auto read = readImageSet(folder.path(), options, job);
+        ASSERT_TRUE(read) << read.error().text();
+        std::string notes;
+        for (const std::string& note : job.takeNotes())
+            if (note.find("pose") != std::string::npos) notes += note + "\n";
+        EXPECT_NE(notes.find(c.note), std::string::npos) << notes;
+        EXPECT_EQ(notes.empty(), *c.note == 0) << notes;
+        ASSERT_EQ(read->views.size(), c.left.size());
+        for (std::size_t i = 0; i < c.left.size(); ++i) {
+            EXPECT_EQ(read->views[i].name, std::to_string(c.left[i]));
+            EXPECT_EQ(read->views[i].camera.position.x, c.left[i] + c.shift);
+        }
+    }
+}
+
 TEST(LostTracking, OfAllPosesIsAnError) {
     const TemporaryFolder tum, scenes;
     writeRecordings(tum, scenes);

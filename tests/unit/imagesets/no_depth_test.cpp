@@ -82,19 +82,60 @@ TEST(NoDepth, OfAPhotographIsUnknown) {
 
 TEST(NoDepth, OfAPictureWithTransparentPixelsIsNothing) {
     const TemporaryFolder folder;
-    writeSet(folder.path(), roomViews(), [](int x, int) { return x < 80 ? 255 : 0; });
+    // All that is opaque has depth.
+    writeSet(folder.path(), roomViews(),
+             [](int x, int y) { return x >= 60 && x < 80 && y >= 2 && y < kHeight - 2 ? 255 : 0; });
     const auto read = readSet(folder.path());
     ASSERT_TRUE(read) << read.error().text();
     EXPECT_EQ(read->views[0].noDepth, NoDepth::empty);
     expectAlpha(read->views[0], 0.0f);
+}
+
+/// A hole in a cut-out object was "nothing is there", which took away what other views show there.
+TEST(NoDepth, InsideACutOutIsUnknown) {
+    const TemporaryFolder folder;
+    writeSet(folder.path(), roomViews(), [](int x, int) { return x < 80 ? 255 : 0; });
+    const auto read = readSet(folder.path());
+    ASSERT_TRUE(read) << read.error().text();
+    EXPECT_EQ(read->views[0].noDepth, NoDepth::unknown);
+    EXPECT_EQ(read->views[0].texture.at(15, 10).a, 1.0f) << "the sensor missed it";
+    EXPECT_EQ(read->views[0].texture.at(85, 10).a, 0.0f)
+        << "the picture says that nothing is there";
 
     ImageSetOptions options;
-    options.noDepth = NoDepth::unknown;
-    const auto unknown = readSet(folder.path(), options);
-    ASSERT_TRUE(unknown);
-    EXPECT_EQ(unknown->views[0].texture.at(15, 10).a, 1.0f) << "the sensor missed it";
-    EXPECT_EQ(unknown->views[0].texture.at(85, 10).a, 0.0f)
-        << "the picture says that nothing is there";
+    options.noDepth = NoDepth::empty;
+    const auto empty = readSet(folder.path(), options);
+    ASSERT_TRUE(empty);
+    EXPECT_EQ(empty->views[0].noDepth, NoDepth::empty);
+    expectAlpha(empty->views[0], 0.0f);
+}
+
+/// Outlines inside pixels of coarse depth are no holes, one that is opaque all over is.
+TEST(NoDepth, OfDepthThatIsCoarserThanItsCutOutIsJudgedByWholePixels) {
+    const auto view = roomViews(1)[0];
+    const Camera& c = view.camera;
+    for (const bool hole : {false, true}) {
+        std::vector<std::uint8_t> pixels(std::size_t{4} * kWidth * kHeight, 255);
+        for (int y = 0; y < kHeight; ++y)
+            for (int x = 0; x < 21; ++x)
+                pixels[static_cast<std::size_t>(4 * (y * kWidth + x) + 3)] = 0;
+        const TemporaryFolder folder;
+        const auto png = encodePng(kWidth, kHeight, 4, 8, pixels.data(), true);
+        ASSERT_TRUE(png);
+        writeBytes(folder / "a.png", *png);
+        // Columns 20 and 21 of the picture are one of the depth.
+        writeCodes(folder / "d.png", kWidth / 2, kHeight / 2, 16,
+                   [&](int x, int y) { return x < 11 || (hole && x == 30 && y == 9) ? 0 : 2000; });
+        writeText(
+            folder / "transforms.json",
+            fmt::format("{{\"w\":96,\"h\":64,\"fl_x\":{},\"fl_y\":{},\"cx\":{},\"cy\":{},"
+                        "\"frames\":[{}]}}",
+                        c.fx, c.fy, c.cx, c.cy,
+                        transformsFrame(c.worldFromCamera(), ",\"depth_file_path\":\"d.png\"")));
+        const auto read = readSet(folder.path());
+        ASSERT_TRUE(read) << read.error().text();
+        EXPECT_EQ(read->views[0].noDepth, hole ? NoDepth::unknown : NoDepth::empty);
+    }
 }
 
 TEST(NoDepth, AlphaThatIsFullEverywhereSaysNothing) {
@@ -169,7 +210,7 @@ TEST(NoDepth, MasksOfTheSetAreRead) {
     const auto read = readSet(folder.path());
     ASSERT_TRUE(read) << read.error().text();
     const ReferenceView& view = read->views[0];
-    EXPECT_EQ(view.noDepth, NoDepth::empty);
+    EXPECT_EQ(view.noDepth, NoDepth::unknown) << "the sensor missed the border";
     EXPECT_FALSE(hasPoint(view.depth.at(55, 30)));
     EXPECT_EQ(view.texture.at(55, 30).a, 0.0f);
     EXPECT_TRUE(hasPoint(view.depth.at(65, 30)));

@@ -39,7 +39,8 @@ Image<float> undistorted(const Inverse& inverse) {
         for (int x = 0; x < kSkewedSide; ++x)
             depth.at(x, y) = static_cast<float>(1.0 / inverse(x + 0.5, y + 0.5));
     const Texture texture(Rgba8Image(kSkewedSide, kSkewedSide, {9, 9, 9, 255}));
-    return undistort(texture, depth, coarseCamera(), skewed()).second;
+    return undistort(texture, depth, coarseCamera(), skewed(), {0, 0, kSkewedSide, kSkewedSide})
+        .second;
 }
 
 }  // namespace
@@ -86,4 +87,40 @@ TEST(Undistort, AMixedPixelIsNoSlope) {
             const double q = 1.0 / depth.at(x, y);
             EXPECT_LT(std::min({std::abs(q - 0.1), std::abs(q - 0.55), std::abs(q - 1)}), 1e-5);
         }
+}
+
+/// What a pinhole sees around the picture is left out, and nothing else: all of the part is shown,
+/// and no side could be a pixel farther out with most of it shown.
+TEST(ShownPart, IsTheRectangleThatThePictureShows) {
+    Camera camera;
+    camera.width = 120;
+    camera.height = 80;
+    camera.fx = camera.fy = 75;
+    camera.cx = 57;
+    camera.cy = 42;
+    for (const double k1 : {0.25, 0.05, -0.1}) {
+        SCOPED_TRACE(k1);
+        Lens lens;
+        lens.k1 = k1;
+        const PixelRectangle part = lens.shownPart(camera);
+        for (int y = part.y; y < part.y + part.height; ++y)
+            for (int x = part.x; x < part.x + part.width; ++x)
+                ASSERT_TRUE(lens.isShown(camera, {x + 0.5, y + 0.5})) << x << ", " << y;
+        EXPECT_EQ(part.width % 2, 0);
+        EXPECT_EQ(part.height % 2, 0);
+        if (k1 < 0) {
+            EXPECT_EQ(part.width, camera.width);
+            EXPECT_EQ(part.height, camera.height);
+            EXPECT_GT(lens.cutShare(camera, part), 0.02);
+            continue;
+        }
+        EXPECT_LT(part.width, camera.width);
+        int shown = 0;
+        for (int y = 0; y < camera.height; ++y)
+            for (int x = 0; x < camera.width; ++x)
+                shown += lens.isShown(camera, {x + 0.5, y + 0.5}) ? 1 : 0;
+        // The shown part bulges: a rectangle inside it is somewhat smaller.
+        EXPECT_GT(part.width * part.height, 0.85 * shown);
+        EXPECT_LT(lens.cutShare(camera, part), 0.2);
+    }
 }

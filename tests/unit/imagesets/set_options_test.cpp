@@ -1,5 +1,6 @@
 // Options of image sets that only some kinds take.
 
+#include "formats/images/npy.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
 using namespace stx;
@@ -280,7 +281,9 @@ TEST(Intrinsics, NineNumbersOfTumAreAMatrixOrALens) {
     std::vector<std::string> notes;
     const auto lens = cameraTold("tum", "20 21 11.5 7.5 0.1 -0.2 0.01 -0.02 0.3\n", &notes);
     ASSERT_TRUE(lens) << lens.error().text();
-    EXPECT_EQ(glm::dvec4(lens->fx, lens->fy, lens->cx, lens->cy), glm::dvec4(20, 21, 12, 8));
+    // Two columns are cut off at the left, where a pinhole sees past the picture.
+    EXPECT_EQ(glm::dvec4(lens->fx, lens->fy, lens->cx, lens->cy), glm::dvec4(20, 21, 10, 8));
+    EXPECT_EQ(lens->width, 22);
     // By the formula of lens.hpp with k1 k2 p1 p2 k3, of all pixels.
     ASSERT_FALSE(notes.empty());
     EXPECT_NE(notes[0].find("lens distortion of up to 1.23 pixels"), std::string::npos) << notes[0];
@@ -315,6 +318,94 @@ TEST(Intrinsics, OfOpen3dAreAMatrixByColumnsOfPicturesOfASize) {
     expectNoCamera("open3d", json("", "20,0,11.5,0,21,7.5,0,0,1"), "a matrix by columns");
     expectNoCamera("open3d", json("", "20,0,0,0,21,0,11.5,7.5"), "9 finite numbers");
     expectNoCamera("open3d", json("", "20,0,0,0,0,0,11.5,7.5,1"), "20 and 0");
+}
+
+/// Open3D writes the steps of depth in one metre beside the intrinsics.
+TEST(DepthUnits, OfOpen3dAreBesideTheIntrinsics) {
+    const TemporaryFolder folder;
+    writeWall(folder, "open3d");
+    const auto write = [&](const char* scale) {
+        writeText(
+            folder / "camera.json",
+            fmt::format(R"({{"depth_scale":{},"intrinsic_matrix":[20,0,0,0,20,0,11.5,7.5,1]}})",
+                        scale));
+    };
+    write("4000.0");
+    ImageSetOptions options = optionsOf("open3d");
+    for (const bool own : {false, true}) {
+        if (own) options.intrinsics[0] = options.intrinsics[1] = 20;
+        const auto read = readNoted(folder.path(), options);
+        ASSERT_TRUE(read.bundle) << read.bundle.error().text();
+        EXPECT_NEAR(read.bundle->views[0].depth.at(9, 9), kCode / 4000.0, 1e-5);
+        EXPECT_NE(read.notes.find("steps of 0.00025 scene units"), std::string::npos) << read.notes;
+    }
+    options.depthUnit = 0.002;
+    const auto given = readSet(folder.path(), options);
+    ASSERT_TRUE(given) << given.error().text();
+    EXPECT_NEAR(given->views[0].depth.at(9, 9), kCode * 0.002, 1e-4);
+    options.depthUnit = 0;
+    write("0");
+    expectError(readSet(folder.path(), options), {"camera.json", "'depth_scale' is 0"});
+    write("1000");
+    const auto usual = readNoted(folder.path(), options);
+    ASSERT_TRUE(usual.bundle) << usual.bundle.error().text();
+    EXPECT_EQ(usual.notes.find("depth_scale"), std::string::npos) << usual.notes;
+}
+
+/// Pictures to look at are no steps of a sensor's usual unit.
+TEST(DepthUnits, Of8BitsAreNotTheUsualOnesOfRecordings) {
+    for (const std::string kind : {"tum", "7scenes", "open3d"}) {
+        SCOPED_TRACE(kind);
+        const TemporaryFolder folder;
+        writeWall(folder, kind);
+        const std::string depth = kind == "tum"       ? "depth/1.png"
+                                  : kind == "7scenes" ? "frame-000000.depth.png"
+                                                      : "depth/0.png";
+        writeCodes(folder / depth, 24, 16, 8, [](int, int) { return 200; });
+        ImageSetOptions options = optionsOf(kind);
+        expectError(readSet(folder.path(), options),
+                    {depth.c_str(), "the depth has 8 bits", "--depth-unit"});
+        options.depthUnit = 0.01;
+        const auto read = readSet(folder.path(), options);
+        EXPECT_TRUE(read) << read.error().text();
+    }
+}
+
+/// nerfstudio multiplies depth by depth_unit_scale_factor, arrays of floats too, and by the scale
+/// that was applied to the poses before.
+TEST(DepthUnits, OfNerfstudioAreOfArraysAndScaledAsThePosesAre) {
+    const TemporaryFolder folder;
+    writeWall(folder, "transforms");
+    writeBytes(folder / "d.npy",
+               encodeNumpy(plane(24, 16, [](int x, int) { return x == 3 ? 1e10 : kCode; })));
+    const auto distance = [&](const std::string& keys, const std::string& depth,
+                              const char* noted) {
+        SCOPED_TRACE(keys + " " + depth);
+        writeText(folder / "transforms.json",
+                  "{" + keys + "\"w\":24,\"h\":16,\"fl_x\":20,\"frames\":[" +
+                      transformsFrame(glm::dmat4(1), ",\"depth_file_path\":\"" + depth + "\"") +
+                      "]}");
+        const auto read = readNoted(folder.path(), optionsOf("transforms"));
+        EXPECT_TRUE(read.bundle) << read.bundle.error().text();
+        if (!read.bundle) return 0.0;
+        EXPECT_EQ(read.notes.find("is taken times") != std::string::npos ||
+                      read.notes.find("are taken times") != std::string::npos,
+                  *noted != 0)
+            << read.notes;
+        EXPECT_NE(read.notes.find(noted), std::string::npos) << read.notes;
+        EXPECT_EQ(hasPoint(read.bundle->views[0].depth.at(3, 9)), depth == "d.png");
+        return static_cast<double>(read.bundle->views[0].depth.at(9, 9));
+    };
+    const std::string applied = "\"applied_scale\":0.25,",
+                      factor = "\"depth_unit_scale_factor\":0.002,";
+    EXPECT_NEAR(distance("", "d.png", ""), 2, 1e-4);
+    EXPECT_NEAR(distance(applied, "d.png", "times 0.25, its applied_scale"), 0.5, 1e-4);
+    EXPECT_NEAR(distance(factor, "d.png", ""), 4, 1e-4);
+    EXPECT_NEAR(distance(factor + applied, "d.png", "times 0.25"), 1, 1e-4);
+    EXPECT_NEAR(distance("\"integer_depth_scale\":0.001," + applied, "d.png", ""), 2, 1e-4);
+    EXPECT_NEAR(distance(applied, "d.npy", ""), kCode, 1);
+    EXPECT_NEAR(distance(factor, "d.npy", "times 0.002"), 4, 1e-4);
+    EXPECT_NEAR(distance(factor + applied, "d.npy", "times 0.0005"), 1, 1e-4);
 }
 
 TEST(Intrinsics, OnesThatCannotBeACamerasAreTold) {

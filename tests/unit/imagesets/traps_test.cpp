@@ -287,14 +287,16 @@ TEST(ColmapTraps, EachLensModelIsUndoneToAThousandthOfAPixel) {
         const ReferenceView& v = read->views[0];
         EXPECT_EQ(v.camera.fx, m.f.x);
         EXPECT_EQ(v.camera.fy, m.f.y);
-        EXPECT_EQ(v.camera.cx, 50);
+        // The border that the picture does not show is cut off.
+        const double left = 50 - v.camera.cx, top = 30 - v.camera.cy;
+        EXPECT_EQ(left > 0, m.k1 > 0) << m.line;
         int checked = 0, unknown = 0;
-        for (int y = 0; y < 64; ++y)
-            for (int x = 0; x < 96; ++x) {
+        for (int y = 0; y < v.depth.height(); ++y)
+            for (int x = 0; x < v.depth.width(); ++x) {
                 unknown += hasPoint(v.depth.at(x, y)) ? 0 : 1;
-                if (v.texture.at(x, y).a < 1) continue;
-                const auto at =
-                    distorted({x + 0.5, y + 0.5}, m.f, {50, 30}, m.k1, m.k2, m.p1, m.p2);
+                ASSERT_EQ(v.texture.at(x, y).a, 1) << m.line << " at " << x << "," << y;
+                const auto at = distorted({left + x + 0.5, top + y + 0.5}, m.f, {50, 30}, m.k1,
+                                          m.k2, m.p1, m.p2);
                 // Beyond the outermost pixel centres there is nothing to interpolate between.
                 if (at.x < 2 || at.y < 2 || at.x > 94 || at.y > 62) continue;
                 ASSERT_NEAR(v.texture.at(x, y).x, at.x, 1e-3) << m.line << " at " << x << "," << y;
@@ -304,6 +306,28 @@ TEST(ColmapTraps, EachLensModelIsUndoneToAThousandthOfAPixel) {
         EXPECT_GT(checked, 4500);
         EXPECT_GE(unknown, 50) << "a column of depth is 0: none";
     }
+}
+
+/// What a pinhole sees past the border of the picture is not known. It was "nothing is there",
+/// which took away what other views show.
+TEST(ColmapTraps, PastTheBorderOfALensIsNotEmpty) {
+    Job job;
+    const auto read = readThroughLens(
+        "1 SIMPLE_RADIAL 96 64 60 48 32 0.25\n", [](int) { return 2.0f; }, job);
+    ASSERT_TRUE(read) << read.error().text();
+    const ReferenceView& v = read->views[0];
+    EXPECT_EQ(v.noDepth, NoDepth::unknown);
+    EXPECT_LT(v.camera.width, 96);
+    EXPECT_EQ(v.camera.cx * 2, v.camera.width);
+    EXPECT_EQ(v.camera.cy * 2, v.camera.height);
+    EXPECT_EQ(v.pointCount(), v.camera.width * v.camera.height);
+    for (const float z : v.depth.pixels()) ASSERT_NEAR(z, 2, 1e-3);
+    std::string notes;
+    for (const std::string& note : job.takeNotes()) notes += note + "\n";
+    EXPECT_NE(
+        notes.find(fmt::format("{}x{} of 96x64 pixels are left", v.camera.width, v.camera.height)),
+        std::string::npos)
+        << notes;
 }
 
 TEST(CamerasTraps, SkewIsRemovedAndItsSizeTold) {
@@ -331,11 +355,13 @@ TEST(CamerasTraps, SkewIsRemovedAndItsSizeTold) {
                   std::string::npos)
             << notes;
         int checked = 0;
-        for (int y = 0; y < h; ++y)
-            for (int x = 0; x < w; ++x) {
-                const glm::vec4 colour = read->views[0].texture.at(x, y);
-                if (colour.a < 1) continue;
-                const glm::dvec2 p(shrunk * (x + 0.5), shrunk * (y + 0.5));
+        const ReferenceView& v = read->views[0];
+        const double left = 50.0 / shrunk - v.camera.cx;  // columns that the picture does not show
+        for (int y = 0; y < v.depth.height(); ++y)
+            for (int x = 0; x < v.depth.width(); ++x) {
+                const glm::vec4 colour = v.texture.at(x, y);
+                ASSERT_EQ(colour.a, 1);
+                const glm::dvec2 p(shrunk * (left + x + 0.5), shrunk * (y + 0.5));
                 const double at = p.x + 2.5 * (p.y - 30) / 82;
                 if (at < 4 || at > 92 || p.y < 4 || p.y > 60) continue;
                 ASSERT_NEAR(colour.x, at, 1e-3);
@@ -519,13 +545,15 @@ TEST(RgbdTraps, PublishedLensesOfTumsCamerasAreUsedAndTold) {
             told |= note.find(c.name.substr(13, 9)) != std::string::npos;
         EXPECT_TRUE(told) << c.name;
         const ReferenceView& v = read->views[0];
-        EXPECT_NEAR(v.camera.cx, c.k.z + 0.5, 1e-9);
+        // The border that the picture does not show is cut off.
+        const double left = c.k.z + 0.5 - v.camera.cx, top = c.k.w + 0.5 - v.camera.cy;
+        EXPECT_EQ(left > 0.5, c.d[0] != 0);
         int checked = 0;
-        for (int y = 0; y < 480; y += 7)
-            for (int x = 0; x < 640; x += 7) {
-                if (v.texture.at(x, y).a < 1) continue;
+        for (int y = 0; y < v.depth.height(); y += 7)
+            for (int x = 0; x < v.depth.width(); x += 7) {
+                ASSERT_EQ(v.texture.at(x, y).a, 1);
                 // Its pixel centres have whole numbers.
-                const glm::dvec2 n((x - c.k.z) / c.k.x, (y - c.k.w) / c.k.y);
+                const glm::dvec2 n((left + x - c.k.z) / c.k.x, (top + y - c.k.w) / c.k.y);
                 const double r2 = glm::dot(n, n);
                 const double radial = 1 + c.d[0] * r2 + c.d[1] * r2 * r2 + c.d[4] * r2 * r2 * r2;
                 const glm::dvec2 at(c.k.x * (n.x * radial + 2 * c.d[2] * n.x * n.y +

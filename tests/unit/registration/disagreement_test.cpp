@@ -62,6 +62,26 @@ TEST(DepthDisagreement, IsTheOffsetThatAViewHas) {
     EXPECT_EQ(aligned->find("--with poses"), std::string::npos) << *aligned;
 }
 
+/// Errors so large that no points are common: they were taken for things in front and behind.
+TEST(DepthDisagreement, FindsDepthThatIsFarOff) {
+    for (const float by : {0.8f, 1.15f, 1.3f, 2.0f}) {
+        SCOPED_TRACE(by);
+        Bundle bundle = exactViews(AnalyticScene::room);
+        for (float& depth : bundle.views[kWrong].depth.pixels()) depth *= by;
+        const DepthDisagreement found = measureDepthDisagreement(bundle);
+        for (std::size_t v = 0; v < bundle.views.size(); ++v) {
+            EXPECT_EQ(found.views[v].disagrees(), v == kWrong) << v;
+            EXPECT_EQ(found.views[v].beyond, v == kWrong ? OverlapSettings().overlapTolerance : 0)
+                << v;
+        }
+        const auto note = disagreementNote(bundle, found, false);
+        ASSERT_TRUE(note);
+        EXPECT_NE(note->find("1 of 5 views disagrees"), std::string::npos) << *note;
+        EXPECT_NE(note->find("'view3' by more than 10 %"), std::string::npos) << *note;
+        EXPECT_EQ(note->find("(0 %)"), std::string::npos) << *note;
+    }
+}
+
 /// Views that are not kept give the same, in whichever order and on however many threads they come.
 void expectTheSameOneByOne(const Bundle& bundle, const OverlapSettings& settings) {
     const DepthDisagreement whole = measureDepthDisagreement(bundle, settings);
@@ -86,9 +106,10 @@ void expectTheSameOneByOne(const Bundle& bundle, const OverlapSettings& settings
     ASSERT_EQ(found.views.size(), whole.views.size());
     for (std::size_t v = 0; v < found.views.size(); ++v) {
         const ViewDisagreement &a = found.views[v], &b = whole.views[v];
-        EXPECT_EQ(
-            std::tie(a.partners, a.overlap, a.relative, a.oneSurface, a.farthest, a.farthestBy),
-            std::tie(b.partners, b.overlap, b.relative, b.oneSurface, b.farthest, b.farthestBy))
+        EXPECT_EQ(std::tie(a.partners, a.overlap, a.relative, a.oneSurface, a.farthest,
+                           a.farthestBy, a.beyond),
+                  std::tie(b.partners, b.overlap, b.relative, b.oneSurface, b.farthest,
+                           b.farthestBy, b.beyond))
             << v;
     }
     EXPECT_EQ(disagreementNote(bundle, found, false), disagreementNote(bundle, whole, false));
@@ -107,6 +128,12 @@ TEST(DepthDisagreement, OfViewsOneByOneIsThatOfAllAtOnce) {
         settings.neighbours = 3;
         expectTheSameOneByOne(bundle, settings);
     }
+}
+
+TEST(DepthDisagreement, OfDepthThatIsFarOffOneByOneIsThatOfAllAtOnce) {
+    Bundle bundle = exactViews(AnalyticScene::room);
+    for (float& depth : bundle.views[kWrong].depth.pixels()) depth *= 1.5f;
+    expectTheSameOneByOne(bundle, OverlapSettings());
 }
 
 TEST(DepthDisagreement, OfManyViewsEachIsLookedForInSome) {
