@@ -54,6 +54,15 @@ constexpr int kRadii[] = {1, 2, 4, 6, 8};
 constexpr float kAim = 0.001f;
 /// The window grows while all estimates so far agree within so many of their standard deviations.
 constexpr float kAgree = 2.0f;
+/// A point is the mean of what its own plane and those of the points up to so many pixels away say
+/// of it, where these agree within so many standard deviations of both; in clutter within as much
+/// less as the bands are narrower. 167 noisy cases of tests/sweep (seeds 4401 and 4402) gain 0.42
+/// dB in the mean (splats 0.50), the statue 0.28 and 0.63 with 0.5 and 2 %. 4 instead of 8: 0.37 of
+/// the 0.56 of seed 4401; 12: -0.4 on the oak tree. Up to 6 pixels away: no more.
+constexpr int kShared = 4;
+constexpr float kSharedAgree = 8.0f;
+/// Rows that are smoothed at once, so that few of the planes are in memory.
+constexpr int kRowsAtOnce = 64;
 /// Wide bands leave surfaces as they are, narrow ones keep leaves apart that are no further from
 /// each other than the noise.
 constexpr SmoothSurface::Bands kWideBands{4.0f, 3.0f}, kNarrowBands{1.7f, 1.2f};
@@ -357,6 +366,65 @@ SmoothSurface::Point SmoothSurface::at(int x, int y) const {
     return point;
 }
 
+namespace {
+
+/// The points of some rows of a SmoothSurface.
+class SmoothRows {
+  public:
+    SmoothRows(const SmoothSurface& smooth, const Image<float>& q, int first, int last)
+        : first_(std::max(first, 0)),
+          band_(kSharedAgree * smooth.bands().then / kWideBands.then),
+          points_(q.width(), std::min(last, q.height()) - first_, {}) {
+        for (int y = 0; y < points_.height(); ++y) {
+            for (int x = 0; x < q.width(); ++x) {
+                const float here = q.at(x, first_ + y);
+                if (!(here > 0.0f)) continue;
+                SmoothSurface::Point& point = points_.at(x, y);
+                point = smooth.at(x, first_ + y);
+                if (!(point.q > 0.0f)) point.q = here;
+            }
+        }
+    }
+    /// What the planes of a point and of those around it say of it, those with less doubt more.
+    /// Its doubt is its own: neighbours share much of their windows.
+    [[nodiscard]] SmoothSurface::Point mean(int x, int row) const {
+        const int y = row - first_;
+        const SmoothSurface::Point here = points_.at(x, y);
+        float off = 0, weights = 0;
+        glm::vec2 slopes(0.0f);
+        const int y0 = std::max(y - kShared, 0), y1 = std::min(y + kShared, points_.height() - 1);
+        const int x0 = std::max(x - kShared, 0), x1 = std::min(x + kShared, points_.width() - 1);
+        for (int ny = y0; ny <= y1; ++ny) {
+            const auto there = points_.row(ny);
+            const auto dy = static_cast<float>(y - ny);
+            for (int nx = x0; nx <= x1; ++nx) {
+                const SmoothSurface::Point& other = there[nx];
+                if (!(other.q > 0.0f)) continue;
+                const auto dx = static_cast<float>(x - nx);
+                const float above = other.q + other.slope.x * dx + other.slope.y * dy - here.q;
+                const float variance = other.doubt * other.doubt;
+                const float agree =
+                    1.0f - above * above / (band_ * band_ * (here.doubt * here.doubt + variance));
+                constexpr auto kReach = static_cast<float>((kShared + 1) * (kShared + 1));
+                const float close = 1.0f - (dx * dx + dy * dy) / kReach;
+                if (!(agree > 0.0f) || !(close > 0.0f)) continue;
+                const float weight = agree * agree * close / variance;
+                off += weight * above;
+                slopes += weight * other.slope;
+                weights += weight;
+            }
+        }
+        return {here.q + off / weights, slopes / weights, here.doubt};
+    }
+
+  private:
+    int first_;
+    float band_;
+    Image<SmoothSurface::Point> points_;
+};
+
+}  // namespace
+
 float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm::vec3>* surface) {
     if (!isNoisy(noise, axis)) return 0.0f;
     const Image<float> from = q;
@@ -364,15 +432,19 @@ float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm
     if (surface) *surface = Image<glm::vec3>(q.width(), q.height(), glm::vec3(0.0f));
     std::vector<double> left(static_cast<std::size_t>(q.height()), 0.0);
     std::vector<std::int64_t> points(left.size(), 0);
-    parallelFor(0, q.height(), 8, [&](int y) {
-        for (int x = 0; x < q.width(); ++x) {
-            const float here = from.at(x, y);
-            if (!(here > 0.0f)) continue;
-            const SmoothSurface::Point point = smooth.at(x, y);
-            if (point.q > 0.0f) q.at(x, y) = point.q;
-            if (surface) surface->at(x, y) = glm::vec3(point.slope, point.doubt);
-            left[y] += point.doubt / axis.relativeScale(here);
-            ++points[y];
+    parallelForBlocks(0, q.height(), kRowsAtOnce, [&](std::int64_t first, std::int64_t last) {
+        const int begin = static_cast<int>(first), end = static_cast<int>(last);
+        const SmoothRows rows(smooth, from, begin - kShared, end + kShared);
+        for (int y = begin; y < end; ++y) {
+            for (int x = 0; x < q.width(); ++x) {
+                const float here = from.at(x, y);
+                if (!(here > 0.0f)) continue;
+                const SmoothSurface::Point point = rows.mean(x, y);
+                if (point.q > 0.0f) q.at(x, y) = point.q;
+                if (surface) surface->at(x, y) = glm::vec3(point.slope, point.doubt);
+                left[y] += point.doubt / axis.relativeScale(here);
+                ++points[y];
+            }
         }
     });
     return kDoubt * static_cast<float>(meanOfRows(left, points).value_or(0));

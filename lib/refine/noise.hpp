@@ -49,6 +49,7 @@ class SmoothSurface {
     SmoothSurface(const Image<float>& q, const DepthAxis& axis, float noise);
     /// At a pixel with a point.
     [[nodiscard]] Point at(int x, int y) const;
+    [[nodiscard]] const Bands& bands() const { return bands_; }
 
   private:
     const Image<float>& q_;
@@ -57,10 +58,11 @@ class SmoothSurface {
     Bands bands_;
 };
 
-/// Replaces each point by that of its SmoothSurface when isNoisy(); else leaves all as they are.
-/// `noise` is depthNoise(). Gives how far off points may be then, a share of q; 0 when nothing was
-/// done. The same on any number of threads. `surface`, if any, gets NoisyView::surface when
-/// something was done.
+/// Replaces each point, when isNoisy(), by the mean of what the planes of its SmoothSurface around
+/// it say of it (Foi, Katkovnik & Egiazarian 2007); else leaves all as they are. `noise` is
+/// depthNoise(). Gives how far off points may be then, a share of q; 0 when nothing was done. The
+/// same on any number of threads. `surface`, if any, gets NoisyView::surface when something was
+/// done.
 float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise,
                   Image<glm::vec3>* surface = nullptr);
 
