@@ -134,7 +134,7 @@ std::vector<NamedPath> outputsOf(const PathOptions& paths, const std::string& on
 Result<void> checkPaths(const std::vector<NamedPath>& inputs,
                         const std::vector<NamedPath>& outputs) {
     STX_CHECK(checkOutputNames(outputs, inputs));
-    rememberNumberedInputs(inputs);
+    rememberInputs(inputs, outputs);
     for (const NamedPath& output : outputs) {
         if (output.option != "--report") continue;
         STX_CHECK(checkReportName(output.path));

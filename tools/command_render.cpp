@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/files/named_files.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
@@ -137,13 +138,15 @@ Result<int> printDevices(Program& program) {
                 "for a software one");
 }
 
-/// Under --no-clobber: errors when one of the pictures exists.
+/// Errors when one of the pictures is an input or a file that one names, under --no-clobber when
+/// it exists.
 Result<void> checkFrames(const RenderOptions& o, int count, Program& program) {
-    if (!program.common.noClobber || o.skipExisting) return {};
+    if (o.skipExisting) return {};
     const auto part = o.shard.rangeOf(static_cast<std::size_t>(count));
     for (std::size_t i = part.first; i < part.end; ++i) {
         if (const auto name = frameName(o.output, static_cast<int>(i)))
-            STX_CHECK(checkTarget(*name, program));
+            STX_CHECK(program.common.noClobber ? checkTarget(*name, program)
+                                               : checkIsNotNamed(*name));
     }
     return {};
 }

@@ -51,6 +51,14 @@ std::vector<std::string> placesReadWith(const std::string& path) {
     return places;
 }
 
+/// Whether files of other names are written than the output's own. Not of one with {stem}, which
+/// becomes a name for each input.
+bool writesSeveral(const NamedPath& output) {
+    std::error_code ec;
+    return output.path.find('{') == std::string::npos &&
+           (frameName(output.path, 0) || fs::is_directory(output.path, ec));
+}
+
 /// "-o 'b.exr' is the input 'a.exr'".
 std::string clash(const NamedPath& output, const NamedPath& input) {
     return fmt::format("{} '{}' is {} '{}'", output.option, output.path,
@@ -127,8 +135,13 @@ std::vector<NamedPath> alikeAmong(const std::vector<std::string>& inputs,
     return alike;
 }
 
-void rememberNumberedInputs(const std::vector<NamedPath>& inputs) {
+void rememberInputs(const std::vector<NamedPath>& inputs, const std::vector<NamedPath>& outputs) {
+    const bool many = std::ranges::any_of(outputs, writesSeveral);
     for (const NamedPath& input : inputs) {
+        const auto same = [&](const NamedPath& o) { return samePath(o.path, input.path); };
+        // Devices and pipes have no place, and nothing to lose.
+        if (many && placeOf(input.path) && std::ranges::none_of(outputs, same))
+            rememberInput(input.path);
         if (!isNumberedFilm(input.path)) continue;
         // Where none is there, opening the input says so.
         if (const auto files = numberedFiles(input.path))

@@ -40,8 +40,11 @@ struct NamedPath {
 /// The name of a file or folder without the folders that it is in.
 [[nodiscard]] std::string lastName(const std::string& path);
 
-/// Remembers the files of numbered inputs (`name_%04d.png`) as files that an input names.
-void rememberNumberedInputs(const std::vector<NamedPath>& inputs);
+/// Remembers the files of numbered inputs (`name_%04d.png`) as files that an input names. Where an
+/// output is numbered or a folder that is there, its files may have the names of inputs, which
+/// checkOutputNames() does not see: inputs are remembered then, but for those that an output
+/// replaces.
+void rememberInputs(const std::vector<NamedPath>& inputs, const std::vector<NamedPath>& outputs);
 
 /// Error (usage) where a report would be the main file of a folder that is an input or an output:
 /// an atlas' atlas.json, a set's transforms.json, cameras.json or files of COLMAP. It would be
