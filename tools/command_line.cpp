@@ -144,6 +144,19 @@ Result<void> checkPaths(const std::vector<NamedPath>& inputs,
     return {};
 }
 
+/// Errors (usage) where the JSON that a command prints would be mixed with an output.
+Result<void> checkPrintsAlone(const CLI::App& app, const std::vector<NamedPath>& outputs) {
+    const CLI::Option* format = app.get_option_no_throw("--format");
+    if (!format || format->count() == 0 || format->reduced_results().back() != "json") return {};
+    for (const NamedPath& output : outputs)
+        if (isStandardOutput(output.path))
+            return fail(ErrorCode::usage,
+                        "--format json is printed to standard output, and {} is '{}'; write that "
+                        "to a file",
+                        output.option, output.path);
+    return {};
+}
+
 /// CLI11 takes the next word for the value of "--light=".
 Result<void> checkValuesGiven(int argc, char** argv) {
     for (int i = 1; i < argc && std::string_view(argv[i]) != "--"; ++i) {
@@ -438,7 +451,9 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
         auto inputs = positionalsOf(*entry.app);
         const std::string only = inputs.size() == 1 ? inputs.front().path : "";
         addInputsOf(entry.paths, inputs);
-        STX_CHECK(checkPaths(inputs, outputsOf(entry.paths, only)));
+        const auto outputs = outputsOf(entry.paths, only);
+        STX_CHECK(checkPaths(inputs, outputs));
+        STX_CHECK(checkPrintsAlone(*entry.app, outputs));
         return Request{{}, entry.body, entry.app->get_name()};
     }
     return fail(ErrorCode::usage, "no command was given. See 'stx --help'.");

@@ -67,6 +67,12 @@ std::string clash(const NamedPath& output, const NamedPath& input) {
 
 }  // namespace
 
+bool isStandardOutput(std::string_view path) {
+    static constexpr std::string_view kNames[] = {"-", "/dev/stdout", "/dev/fd/1",
+                                                  "/proc/self/fd/1"};
+    return std::ranges::find(kNames, path) != std::end(kNames);
+}
+
 std::optional<std::string> placeOf(const std::string& path) {
     if (path.empty() || path == "-") return std::nullopt;
     struct stat there = {};
@@ -87,7 +93,17 @@ Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
         for (const std::string& path : placesReadWith(input.path))
             if (auto place = placeOf(path)) inputsAt.emplace(std::move(*place), &input);
     std::map<std::string, const NamedPath*> outputAt;
+    const NamedPath* streamed = nullptr;
     for (const NamedPath& output : outputs) {
+        if (isStandardOutput(output.path)) {
+            if (streamed)
+                return fail(ErrorCode::usage,
+                            "{} '{}' and {} '{}' are both standard output; write one of them to a "
+                            "file",
+                            streamed->option, streamed->path, output.option, output.path);
+            streamed = &output;
+            continue;
+        }
         const auto place = placeOf(output.path);
         if (!place) continue;
         const auto [at, isNew] = outputAt.emplace(*place, &output);

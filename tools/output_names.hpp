@@ -22,12 +22,15 @@ struct NamedPath {
 /// and pipes: several may write to /dev/null. Numbered names are taken as they are.
 [[nodiscard]] std::optional<std::string> placeOf(const std::string& path);
 
+/// Whether it names standard output, whatever that leads to.
+[[nodiscard]] bool isStandardOutput(std::string_view path);
+
 /// Whether both names are of one file or folder, by placeOf().
 [[nodiscard]] bool samePath(const std::string& a, const std::string& b);
 
 /// Errors (usage), before anything is written, where an output is an input, which would be lost, or
-/// another output, of which one would be. An input that is the main file of a folder, or COLMAP's
-/// folder in one, is that folder, too.
+/// another output, of which one would be, or where two are standard output, which would be mixed.
+/// An input that is the main file of a folder, or COLMAP's folder in one, is that folder, too.
 [[nodiscard]] Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
                                             const std::vector<NamedPath>& inputs);
 
