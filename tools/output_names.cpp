@@ -16,20 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path wholePath(const std::string& path) {
-    std::error_code ec;
-    fs::path whole = fs::weakly_canonical(fs::absolute(path, ec), ec);
-    if (ec) whole = fs::absolute(path, ec).lexically_normal();
-    // "folder/" is the folder.
-    return whole.has_filename() || !whole.has_relative_path() ? whole : whole.parent_path();
-}
-
-/// Whether it names a film of numbered files: a file may have such a name itself.
-bool isNumberedFilm(const std::string& path) {
-    std::error_code ec;
-    return frameName(path, 0) && !fs::exists(path, ec);
-}
-
 /// Whether a file of that name is the main file of a folder.
 bool isMainFile(const std::string& name) {
     static constexpr std::string_view kMainFiles[] = {
@@ -66,6 +52,19 @@ std::string clash(const NamedPath& output, const NamedPath& input) {
 }
 
 }  // namespace
+
+fs::path wholePath(const std::string& path) {
+    std::error_code ec;
+    fs::path whole = fs::weakly_canonical(fs::absolute(path, ec), ec);
+    if (ec) whole = fs::absolute(path, ec).lexically_normal();
+    // "folder/" is the folder.
+    return whole.has_filename() || !whole.has_relative_path() ? whole : whole.parent_path();
+}
+
+bool isNumberedFilm(const std::string& path) {
+    std::error_code ec;
+    return frameName(path, 0) && !fs::exists(path, ec);
+}
 
 bool isStandardOutput(std::string_view path) {
     static constexpr std::string_view kNames[] = {"-", "/dev/stdout", "/dev/fd/1",

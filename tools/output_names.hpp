@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -21,6 +22,12 @@ struct NamedPath {
 /// The same for all names of one file or folder, which need not be there yet. Nothing of devices
 /// and pipes: several may write to /dev/null. Numbered names are taken as they are.
 [[nodiscard]] std::optional<std::string> placeOf(const std::string& path);
+
+/// The path from the root, without links as far as it is there, and without a slash at its end.
+[[nodiscard]] std::filesystem::path wholePath(const std::string& path);
+
+/// Whether an input names a film of numbered files: a file may have such a name itself.
+[[nodiscard]] bool isNumberedFilm(const std::string& path);
 
 /// Whether it names standard output, whatever that leads to.
 [[nodiscard]] bool isStandardOutput(std::string_view path);
