@@ -61,6 +61,13 @@ Result<std::optional<glm::vec3>> parseBackground(const std::string& text) {
     return std::optional<glm::vec3>(colour);
 }
 
+/// Whether pictures are of this format, in files or on stdout.
+bool isOf(FrameFormat format, const RenderOptions& o) {
+    if (o.output == "-") return o.fileFormat == (format == FrameFormat::exr ? "exr" : "png");
+    const auto written = frameFormat(o.output);
+    return written && *written == format;
+}
+
 /// Errors (usage) for options that cannot matter, whatever the input is.
 Result<void> checkOptions(const RenderOptions& o, const Command& command) {
     if (o.lights.empty())
@@ -68,12 +75,13 @@ Result<void> checkOptions(const RenderOptions& o, const Command& command) {
                                  "is of lighting; give --light, too"));
     if (o.time.time)
         STX_CHECK(command.refuse({"--times"}, "and --time exclude each other; give one"));
-    if (o.output == "-")
+    if (o.output == "-") {
         STX_CHECK(command.refuse({"--shard"}, "is of numbered files; a stream is one piece"));
-    if (o.output != "-")
+        STX_CHECK(command.refuse({"--skip-existing"}, "is of files; -o is '-', standard output"));
+    }
+    if (o.output != "-" || o.fileFormat != "y4m")
         STX_CHECK(command.refuse({"--fps"}, "is of a stream on stdout, -o - --file-format y4m"));
-    if (const auto format = frameFormat(o.output);
-        o.output == "-" || !format || *format != FrameFormat::png)
+    if (!isOf(FrameFormat::png, o))
         STX_CHECK(command.refuse({"--compression"}, "is of .png pictures"));
     if (o.backend == Backend::cpu)
         STX_CHECK(command.refuse({"--device"}, "is of GPUs; it does not go with --backend cpu"));
@@ -98,10 +106,8 @@ Result<RenderSettings> settingsOf(const RenderOptions& o) {
     s.ownEnvironment =
         !o.environment.given() && (o.background.empty() || o.background == "temporal");
     // What only OpenEXR can hold.
-    const auto format = frameFormat(o.output);
-    const bool exr = format && *format == FrameFormat::exr;
-    if (exr) s.normals = true;
-    s.lighting.beyondOne = exr || o.fileFormat == "exr";
+    s.lighting.beyondOne = isOf(FrameFormat::exr, o);
+    if (s.lighting.beyondOne) s.normals = true;
     for (const auto& text : o.lights) {
         if (text == kEnvironmentLight) continue;
         STX_TRY(const auto light, parseLight(text, glm::dvec3(0.0)));
