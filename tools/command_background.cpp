@@ -39,7 +39,7 @@ struct MaskTarget {
 };
 
 Result<void> checkPngTarget(const std::string& option, const std::string& path, Program& program) {
-    if (!path.ends_with(".png"))
+    if (lowerExtension(path) != ".png")
         return fail(ErrorCode::usage, "{} is '{}'; its name must end in .png", option, path);
     return checkTarget(path, program);
 }

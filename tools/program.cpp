@@ -448,7 +448,7 @@ Result<FolderTarget> folderTarget(const std::string& target, const std::vector<s
 
 Result<void> checkPlotTarget(std::string_view option, const std::string& target, Program& program) {
     if (target.empty()) return {};
-    if (!target.ends_with(".svg"))
+    if (lowerExtension(target) != ".svg")
         return fail(ErrorCode::usage, "{} is '{}'; its name must end in .svg", option, target);
     return checkTarget(target, program);
 }
