@@ -220,6 +220,7 @@ Option& Option::takes(const std::string& what) {
 }
 Option& Option::reads(const std::string& what) {
     paths_->inputs.push_back(option_);
+    option_->transform([](std::string text) { return inputNamed(std::move(text)); });
     return takes(what);
 }
 Option& Option::writes(const std::string& what) {
