@@ -315,7 +315,7 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     if (lightsByEnvironment(o) && command.given({"--ambient"}).empty()) o.ambient = "0";
     STX_TRY(auto settings, settingsOf(o));
     STX_CHECK(parseBackground(o.background));
-    STX_CHECK(checkTarget(o.output, program));
+    STX_CHECK(checkFileTarget(o.output, program));
     STX_TRY(const int wanted, checkCameraOptions(o.camera, command, program));
     STX_CHECK(checkNames(o, wanted, program));
     STX_TRY(auto writing, writingOf(o, program));

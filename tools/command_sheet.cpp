@@ -169,7 +169,7 @@ Result<int> sheet(const SheetOptions& options, const Command& command, Program& 
     if (lowerExtension(o.output) != ".png" && o.output != "-")
         return fail(ErrorCode::usage, "-o is '{}'; a sheet is a .png", o.output);
     if (!o.size.empty()) STX_SET(o.settings.mostSize, parseSize(o.size, program.job.limits));
-    STX_CHECK(checkTarget(o.output, program));
+    STX_CHECK(checkFileTarget(o.output, program));
     for (const auto& input : o.inputs) {
         preloadCodecs(input);
         o.settings.title += (o.settings.title.empty() ? "" : " | ") + fileName(input);
