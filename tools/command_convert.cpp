@@ -224,6 +224,10 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
     return done;
 }
 
+/// What films take in place of --frame and --frames.
+constexpr const char* kInsteadOfFrame =
+    "-o 'name_%04d.exr' writes all of its frames, and stx extract --time T one moment as a set";
+
 Result<nlohmann::ordered_json> convertOne(const BatchItem& item, const ConvertOptions& o,
                                           Program& program) {
     const Stopwatch watch;
@@ -231,10 +235,7 @@ Result<nlohmann::ordered_json> convertOne(const BatchItem& item, const ConvertOp
     STX_CHECK(checkTarget(target, program));
     STX_CHECK(containerOf(target));
     if (o.frameGiven)
-        STX_CHECK(checkFrameOf(input, o.open, "--frame",
-                               "-o 'name_%04d.exr' writes all of its frames, and stx extract "
-                               "--time T one moment as a set",
-                               program.job));
+        STX_CHECK(checkFrameOf(input, o.open, "--frame", kInsteadOfFrame, program.job));
     // Only the report has the points, for which the images must be decoded.
     const bool countPoints = !program.common.report.empty();
     std::optional<Converted> done;
@@ -309,6 +310,7 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
     OpenOptions open = o.open;
     open.set.texturePattern = open.texture;
     open.set.frame = static_cast<int>(first);
+    STX_CHECK(checkFrameOf(o.inputs[0], open, "--frames", kInsteadOfFrame, program.job));
     STX_TRY(const int count, imageSetFrameCount(o.inputs[0], open.set, program.job));
     if (last >= count)
         return failAt(fmt::format("'{}'", o.inputs[0]), ErrorCode::invalidInput,
