@@ -17,10 +17,12 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/files/messages.hpp"
+#include "formats/files/numbered.hpp"
 #include "formats/files/pipes.hpp"
 #include "formats/files/temporaries.hpp"
 #include "formats/files/text_encoding.hpp"
 #include "lib/base/parallel.hpp"
+#include "tools/output_names.hpp"
 #include "tools/stop_signals.hpp"
 
 namespace stx::tools {
@@ -65,6 +67,30 @@ bool namesEach(const std::string& pattern) {
            pattern.find("{dir}") != std::string::npos ||
            pattern.find("{parent}") != std::string::npos;
 }
+
+/// Whether what an item makes is there.
+bool isMade(const BatchItem& item) {
+    std::error_code ec;
+    return item.numbered ? isThere(item.output) : fs::exists(item.output, ec);
+}
+
+/// Names an output without links in its folder, the same for all names of one file that is not a
+/// link itself. Each folder is looked at once: there may be a million outputs.
+class PlainNames {
+  public:
+    std::string of(const std::string& output) {
+        const fs::path path(output);
+        const bool named = path.has_filename() && path.filename() != "." && path.filename() != "..";
+        if (!named) return wholePath(output).string();
+        const std::string folder = folderOf(path).string();
+        const auto [known, fresh] = folders_.try_emplace(folder);
+        if (fresh) known->second = wholePath(folder);
+        return (known->second / path.filename()).string();
+    }
+
+  private:
+    std::map<std::string, fs::path> folders_;
+};
 
 }  // namespace
 
@@ -284,7 +310,7 @@ Result<void> BatchRun::giveItems() {
     const auto wanted = static_cast<std::size_t>(std::max(1, options_.jobs));
     while (mayStart()) {
         const auto& item = items_[next_];
-        if (options_.skipExisting && isThere(item.output)) {
+        if (options_.skipExisting && isMade(item)) {
             auto entry = entryOf(item, "skipped");
             entry["seconds"] = 0.0;
             finish(next_++, std::move(entry));
@@ -433,10 +459,12 @@ Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
     std::vector<BatchItem> items;
     std::vector<NamedPath> outputs;  // that may be inputs
     std::map<std::string, std::string> inputOf;
-    std::error_code ec;
+    PlainNames plain;
+    const bool numbered = frameName(pattern, 0).has_value();
     for (const auto& input : inputs) {
-        BatchItem item{input, outputOf(pattern, input), items.size()};
-        const auto key = fs::absolute(item.output, ec).lexically_normal().string();
+        BatchItem item{input, outputOf(pattern, input), items.size(),
+                       numbered || isNumberedFilm(input)};
+        const auto key = plain.of(item.numbered ? fileOfStill(item.output) : item.output);
         if (const auto [known, fresh] = inputOf.emplace(key, input); !fresh)
             return fail(
                 ErrorCode::usage,
@@ -463,7 +491,7 @@ Result<int> runBatch(const std::vector<BatchItem>& items, const BatchOptions& op
     std::optional<Error> refused;
     bool any = false;
     for (const auto& item : items) {
-        if (!options.keepGoing && !(options.skipExisting && isThere(item.output)))
+        if (!options.keepGoing && !(options.skipExisting && isMade(item)))
             STX_CHECK(checkTarget(item.output, program));
         const auto made = item.output.empty() ? Result<void>() : program.makeFolderOf(item.output);
         any = any || made;
@@ -483,7 +511,7 @@ Result<int> runInTurn(const std::vector<BatchItem>& items, const BatchOptions& o
     for (const BatchItem& item : items) {
         if (first && (!goesOn || program.job.cancelled)) break;
         auto entry = entryOf(item, "skipped");
-        if (options.skipExisting && isThere(item.output)) {
+        if (options.skipExisting && isMade(item)) {
             ++skipped;
         } else if (auto done = work(item, program); done) {
             entry = std::move(*done);

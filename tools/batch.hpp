@@ -13,6 +13,9 @@ namespace stx::tools {
 struct BatchItem {
     std::string input, output;
     std::size_t index = 0;  ///< in the whole list, of which this may be a shard
+    /// Whether the output names numbered files (name_%d.exr): -o has the number, or the input is
+    /// such a film. Else a % that came from the input's name is itself.
+    bool numbered = false;
 };
 
 struct BatchOptions {

@@ -39,9 +39,9 @@ struct MaskTarget {
 };
 
 Result<void> checkPngTarget(const std::string& option, const std::string& path, Program& program) {
-    if (!path.ends_with(".png"))
+    if (lowerExtension(path) != ".png")
         return fail(ErrorCode::usage, "{} is '{}'; its name must end in .png", option, path);
-    return checkTarget(path, program);
+    return checkFileTarget(path, program);
 }
 
 /// The pattern of the masks' names; beside the background when there is none.
@@ -245,7 +245,7 @@ Result<int> backgroundOfBundle(const BackgroundOptions& o, const Command& comman
 /// The background of plain frames.
 Result<int> backgroundOfFrames(const BackgroundOptions& o, Program& program) {
     const Stopwatch watch;
-    STX_CHECK(checkTarget(o.output, program));
+    STX_CHECK(checkFileTarget(o.output, program));
     STX_CHECK(frameFormat(o.output));
     if (!o.confidence.empty()) STX_CHECK(checkPngTarget("--confidence", o.confidence, program));
     const std::vector<std::filesystem::path> inputs(o.inputs.begin(), o.inputs.end());

@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/files/no_case.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
@@ -282,7 +283,7 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
                     "--error-picture is '{}', one file for all frames; a numbered name is "
                     "expected, as in 'error_%04d.png'",
                     o.errorPicture);
-    if (!folders && !o.errorPicture.empty() && !o.errorPicture.ends_with(".png"))
+    if (!folders && !o.errorPicture.empty() && lowerExtension(o.errorPicture) != ".png")
         return fail(ErrorCode::usage, "--error-picture is '{}'; its name must end in .png",
                     o.errorPicture);
     STX_TRY(const auto mask, openMask(o, program));

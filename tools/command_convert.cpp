@@ -8,6 +8,8 @@
 #include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/files/no_case.hpp"
+#include "formats/files/numbered.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/stx/mesh_views.hpp"
@@ -123,9 +125,8 @@ Result<std::unique_ptr<ViewTable>> changedAsAsked(std::unique_ptr<ViewTable> tab
 
 /// One moment, of which each view is written when it is there.
 Result<Converted> convertStill(const std::filesystem::path& input,
-                               const std::filesystem::path& named, const ConvertOptions& o,
+                               const std::filesystem::path& target, const ConvertOptions& o,
                                bool countPoints, Program& program) {
-    const std::filesystem::path target = fileOfStill(named.string());
     const auto imported = std::make_shared<bool>(false);
     STX_TRY(auto opened, openMeshOrViews(input, openOptions(o, imported), program.job));
     auto* mesh = std::get_if<Mesh>(&opened);
@@ -223,17 +224,18 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
     return done;
 }
 
-Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
-                                          const std::filesystem::path& target,
-                                          const ConvertOptions& o, Program& program) {
+/// What films take in place of --frame and --frames.
+constexpr const char* kInsteadOfFrame =
+    "-o 'name_%04d.exr' writes all of its frames, and stx extract --time T one moment as a set";
+
+Result<nlohmann::ordered_json> convertOne(const BatchItem& item, const ConvertOptions& o,
+                                          Program& program) {
     const Stopwatch watch;
+    const std::filesystem::path input = item.input, target = item.output;
     STX_CHECK(checkTarget(target, program));
     STX_CHECK(containerOf(target));
     if (o.frameGiven)
-        STX_CHECK(checkFrameOf(input, o.open, "--frame",
-                               "-o 'name_%04d.exr' writes all of its frames, and stx extract "
-                               "--time T one moment as a set",
-                               program.job));
+        STX_CHECK(checkFrameOf(input, o.open, "--frame", kInsteadOfFrame, program.job));
     // Only the report has the points, for which the images must be decoded.
     const bool countPoints = !program.common.report.empty();
     std::optional<Converted> done;
@@ -251,8 +253,13 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
                 program.job.note("the scene shows no view with images; it is written as it is");
         }
     }
-    if (!done) STX_SET(done, convertSequence(input, target, o, countPoints, program));
-    if (!done) STX_SET(done, convertStill(input, target, o, countPoints, program));
+    // Only a numbered OpenEXR name takes frames.
+    const bool oneFile = !item.numbered && lowerExtension(target) == ".exr";
+    if (!done && !oneFile) STX_SET(done, convertSequence(input, target, o, countPoints, program));
+    if (!done) {
+        const std::string file = oneFile ? item.output : fileOfStill(item.output);
+        STX_SET(done, convertStill(input, file, o, countPoints, program));
+    }
     const Timeline& timeline = done->timeline;
     if (!o.video.empty() && !timeline.moves())
         program.job.noteUnused({"--video"}, "of films", "nothing moves");
@@ -303,6 +310,7 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
     OpenOptions open = o.open;
     open.set.texturePattern = open.texture;
     open.set.frame = static_cast<int>(first);
+    STX_CHECK(checkFrameOf(o.inputs[0], open, "--frames", kInsteadOfFrame, program.job));
     STX_TRY(const int count, imageSetFrameCount(o.inputs[0], open.set, program.job));
     if (last >= count)
         return failAt(fmt::format("'{}'", o.inputs[0]), ErrorCode::invalidInput,
@@ -317,11 +325,12 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
         return static_cast<int>(first) + static_cast<int>(index);
     };
     for (std::size_t i = part.first; i < part.end; ++i)
-        items.push_back({o.inputs[0], imagesets::filled(o.output, {"", 0, 0, frameOf(i)}), i});
+        items.push_back({o.inputs[0], imagesets::filled(o.output, {"", 0, 0, frameOf(i)}), i,
+                         frameName(o.output, 0).has_value()});
     const BatchWork work = [&](const BatchItem& item, Program& p) {
         ConvertOptions one = o;
         one.open.set.frame = frameOf(item.index);
-        return convertOne(item.input, item.output, one, p);
+        return convertOne(item, one, p);
     };
     return runInTurn(items, batch, work, program);
 }
@@ -367,7 +376,7 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
     STX_CHECK(containerOf(items[0].output));
     const BatchWork work = [&](const BatchItem& item, Program& p) {
         preloadCodecs(item.input);
-        return convertOne(item.input, item.output, o, p);
+        return convertOne(item, o, p);
     };
     // One name on the command line is one conversion; a list is a batch, however short.
     o.batch.total = items.size();

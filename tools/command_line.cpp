@@ -134,13 +134,26 @@ std::vector<NamedPath> outputsOf(const PathOptions& paths, const std::string& on
 Result<void> checkPaths(const std::vector<NamedPath>& inputs,
                         const std::vector<NamedPath>& outputs) {
     STX_CHECK(checkOutputNames(outputs, inputs));
-    rememberNumberedInputs(inputs);
+    rememberInputs(inputs, outputs);
     for (const NamedPath& output : outputs) {
         if (output.option != "--report") continue;
         STX_CHECK(checkReportName(output.path));
         for (const auto& folders : {inputs, outputs})
             STX_CHECK(checkReportIsNoMainFile(output.path, folders));
     }
+    return {};
+}
+
+/// Errors (usage) where the JSON that a command prints would be mixed with an output.
+Result<void> checkPrintsAlone(const CLI::App& app, const std::vector<NamedPath>& outputs) {
+    const CLI::Option* format = app.get_option_no_throw("--format");
+    if (!format || format->count() == 0 || format->reduced_results().back() != "json") return {};
+    for (const NamedPath& output : outputs)
+        if (isStandardOutput(output.path))
+            return fail(ErrorCode::usage,
+                        "--format json is printed to standard output, and {} is '{}'; write that "
+                        "to a file",
+                        output.option, output.path);
     return {};
 }
 
@@ -207,6 +220,7 @@ Option& Option::takes(const std::string& what) {
 }
 Option& Option::reads(const std::string& what) {
     paths_->inputs.push_back(option_);
+    option_->transform([](std::string text) { return inputNamed(std::move(text)); });
     return takes(what);
 }
 Option& Option::writes(const std::string& what) {
@@ -438,7 +452,9 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
         auto inputs = positionalsOf(*entry.app);
         const std::string only = inputs.size() == 1 ? inputs.front().path : "";
         addInputsOf(entry.paths, inputs);
-        STX_CHECK(checkPaths(inputs, outputsOf(entry.paths, only)));
+        const auto outputs = outputsOf(entry.paths, only);
+        STX_CHECK(checkPaths(inputs, outputs));
+        STX_CHECK(checkPrintsAlone(*entry.app, outputs));
         return Request{{}, entry.body, entry.app->get_name()};
     }
     return fail(ErrorCode::usage, "no command was given. See 'stx --help'.");

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/files/named_files.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
@@ -60,6 +61,13 @@ Result<std::optional<glm::vec3>> parseBackground(const std::string& text) {
     return std::optional<glm::vec3>(colour);
 }
 
+/// Whether pictures are of this format, in files or on stdout.
+bool isOf(FrameFormat format, const RenderOptions& o) {
+    if (o.output == "-") return o.fileFormat == (format == FrameFormat::exr ? "exr" : "png");
+    const auto written = frameFormat(o.output);
+    return written && *written == format;
+}
+
 /// Errors (usage) for options that cannot matter, whatever the input is.
 Result<void> checkOptions(const RenderOptions& o, const Command& command) {
     if (o.lights.empty())
@@ -67,12 +75,13 @@ Result<void> checkOptions(const RenderOptions& o, const Command& command) {
                                  "is of lighting; give --light, too"));
     if (o.time.time)
         STX_CHECK(command.refuse({"--times"}, "and --time exclude each other; give one"));
-    if (o.output == "-")
+    if (o.output == "-") {
         STX_CHECK(command.refuse({"--shard"}, "is of numbered files; a stream is one piece"));
-    if (o.output != "-")
+        STX_CHECK(command.refuse({"--skip-existing"}, "is of files; -o is '-', standard output"));
+    }
+    if (o.output != "-" || o.fileFormat != "y4m")
         STX_CHECK(command.refuse({"--fps"}, "is of a stream on stdout, -o - --file-format y4m"));
-    if (const auto format = frameFormat(o.output);
-        o.output == "-" || !format || *format != FrameFormat::png)
+    if (!isOf(FrameFormat::png, o))
         STX_CHECK(command.refuse({"--compression"}, "is of .png pictures"));
     if (o.backend == Backend::cpu)
         STX_CHECK(command.refuse({"--device"}, "is of GPUs; it does not go with --backend cpu"));
@@ -97,10 +106,8 @@ Result<RenderSettings> settingsOf(const RenderOptions& o) {
     s.ownEnvironment =
         !o.environment.given() && (o.background.empty() || o.background == "temporal");
     // What only OpenEXR can hold.
-    const auto format = frameFormat(o.output);
-    const bool exr = format && *format == FrameFormat::exr;
-    if (exr) s.normals = true;
-    s.lighting.beyondOne = exr || o.fileFormat == "exr";
+    s.lighting.beyondOne = isOf(FrameFormat::exr, o);
+    if (s.lighting.beyondOne) s.normals = true;
     for (const auto& text : o.lights) {
         if (text == kEnvironmentLight) continue;
         STX_TRY(const auto light, parseLight(text, glm::dvec3(0.0)));
@@ -137,13 +144,15 @@ Result<int> printDevices(Program& program) {
                 "for a software one");
 }
 
-/// Under --no-clobber: errors when one of the pictures exists.
+/// Errors when one of the pictures is an input or a file that one names, under --no-clobber when
+/// it exists.
 Result<void> checkFrames(const RenderOptions& o, int count, Program& program) {
-    if (!program.common.noClobber || o.skipExisting) return {};
+    if (o.skipExisting) return {};
     const auto part = o.shard.rangeOf(static_cast<std::size_t>(count));
     for (std::size_t i = part.first; i < part.end; ++i) {
         if (const auto name = frameName(o.output, static_cast<int>(i)))
-            STX_CHECK(checkTarget(*name, program));
+            STX_CHECK(program.common.noClobber ? checkTarget(*name, program)
+                                               : checkIsNotNamed(*name));
     }
     return {};
 }
@@ -306,7 +315,7 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     if (lightsByEnvironment(o) && command.given({"--ambient"}).empty()) o.ambient = "0";
     STX_TRY(auto settings, settingsOf(o));
     STX_CHECK(parseBackground(o.background));
-    STX_CHECK(checkTarget(o.output, program));
+    STX_CHECK(checkFileTarget(o.output, program));
     STX_TRY(const int wanted, checkCameraOptions(o.camera, command, program));
     STX_CHECK(checkNames(o, wanted, program));
     STX_TRY(auto writing, writingOf(o, program));

@@ -30,7 +30,7 @@ Result<std::string> listOfRest(const MergedReport& merged, const std::vector<std
 
 Result<int> report(const ReportOptions& o, const Command& command, Program& program) {
     for (const auto& target : {o.output, o.missing, o.outputs})
-        if (!target.empty()) STX_CHECK(checkTarget(target, program));
+        if (!target.empty()) STX_CHECK(checkFileTarget(target, program));
     std::vector<std::string> names;
     if (!o.inputs.empty()) STX_SET(names, expandInputs(o.inputs, command, program));
     if (!o.missing.empty() && names.empty())

@@ -6,6 +6,7 @@
 #include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/base/printable.hpp"
@@ -165,10 +166,10 @@ Result<int> sheet(const SheetOptions& options, const Command& command, Program& 
     if (o.inputs.size() > 2)
         return fail(ErrorCode::usage, "{} inputs; one, or two to compare, are expected",
                     o.inputs.size());
-    if (!o.output.ends_with(".png") && o.output != "-")
+    if (lowerExtension(o.output) != ".png" && o.output != "-")
         return fail(ErrorCode::usage, "-o is '{}'; a sheet is a .png", o.output);
     if (!o.size.empty()) STX_SET(o.settings.mostSize, parseSize(o.size, program.job.limits));
-    STX_CHECK(checkTarget(o.output, program));
+    STX_CHECK(checkFileTarget(o.output, program));
     for (const auto& input : o.inputs) {
         preloadCodecs(input);
         o.settings.title += (o.settings.title.empty() ? "" : " | ") + fileName(input);

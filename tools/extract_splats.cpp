@@ -65,7 +65,10 @@ Result<std::optional<ExtractAs>> extractedAs(const std::string& as,
     }
     if (as.empty()) {
         // As programs that take such pictures know them.
-        if (words->second[0] == std::string("pair") && file.stem().string().ends_with("_rgbd"))
+        constexpr std::string_view kRgbd = "_rgbd";
+        const std::string stem = file.stem().string();
+        if (words->second[0] == std::string("pair") && stem.size() >= kRgbd.size() &&
+            equalNoCase(std::string_view(stem).substr(stem.size() - kRgbd.size()), kRgbd))
             return rgbd;
         return kWords.at(words->second[0]);
     }

@@ -29,7 +29,7 @@ int mainProgram(int argc, char** argv) {
         program.common = {};
         program.common.noClobber = failed.noClobber;
         // The mistake is reported even where its report has no place.
-        if (!failed.report.empty() && checkTarget(failed.report, program))
+        if (!failed.report.empty() && checkFileTarget(failed.report, program))
             program.common.report = failed.report;
         return program.run([&]() -> Result<int> { return tl::unexpected(request.error()); });
     }

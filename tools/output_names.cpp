@@ -16,20 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path wholePath(const std::string& path) {
-    std::error_code ec;
-    fs::path whole = fs::weakly_canonical(fs::absolute(path, ec), ec);
-    if (ec) whole = fs::absolute(path, ec).lexically_normal();
-    // "folder/" is the folder.
-    return whole.has_filename() || !whole.has_relative_path() ? whole : whole.parent_path();
-}
-
-/// Whether it names a film of numbered files: a file may have such a name itself.
-bool isNumberedFilm(const std::string& path) {
-    std::error_code ec;
-    return frameName(path, 0) && !fs::exists(path, ec);
-}
-
 /// Whether a file of that name is the main file of a folder.
 bool isMainFile(const std::string& name) {
     static constexpr std::string_view kMainFiles[] = {
@@ -51,6 +37,14 @@ std::vector<std::string> placesReadWith(const std::string& path) {
     return places;
 }
 
+/// Whether files of other names are written than the output's own. Not of one with {stem}, which
+/// becomes a name for each input.
+bool writesSeveral(const NamedPath& output) {
+    std::error_code ec;
+    return output.path.find('{') == std::string::npos &&
+           (frameName(output.path, 0) || fs::is_directory(output.path, ec));
+}
+
 /// "-o 'b.exr' is the input 'a.exr'".
 std::string clash(const NamedPath& output, const NamedPath& input) {
     return fmt::format("{} '{}' is {} '{}'", output.option, output.path,
@@ -58,6 +52,25 @@ std::string clash(const NamedPath& output, const NamedPath& input) {
 }
 
 }  // namespace
+
+fs::path wholePath(const std::string& path) {
+    std::error_code ec;
+    fs::path whole = fs::weakly_canonical(fs::absolute(path, ec), ec);
+    if (ec) whole = fs::absolute(path, ec).lexically_normal();
+    // "folder/" is the folder.
+    return whole.has_filename() || !whole.has_relative_path() ? whole : whole.parent_path();
+}
+
+bool isNumberedFilm(const std::string& path) {
+    std::error_code ec;
+    return frameName(path, 0) && !fs::exists(path, ec);
+}
+
+bool isStandardOutput(std::string_view path) {
+    static constexpr std::string_view kNames[] = {"-", "/dev/stdout", "/dev/fd/1",
+                                                  "/proc/self/fd/1"};
+    return std::ranges::find(kNames, path) != std::end(kNames);
+}
 
 std::optional<std::string> placeOf(const std::string& path) {
     if (path.empty() || path == "-") return std::nullopt;
@@ -79,7 +92,17 @@ Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
         for (const std::string& path : placesReadWith(input.path))
             if (auto place = placeOf(path)) inputsAt.emplace(std::move(*place), &input);
     std::map<std::string, const NamedPath*> outputAt;
+    const NamedPath* streamed = nullptr;
     for (const NamedPath& output : outputs) {
+        if (isStandardOutput(output.path)) {
+            if (streamed)
+                return fail(ErrorCode::usage,
+                            "{} '{}' and {} '{}' are both standard output; write one of them to a "
+                            "file",
+                            streamed->option, streamed->path, output.option, output.path);
+            streamed = &output;
+            continue;
+        }
         const auto place = placeOf(output.path);
         if (!place) continue;
         const auto [at, isNew] = outputAt.emplace(*place, &output);
@@ -127,8 +150,13 @@ std::vector<NamedPath> alikeAmong(const std::vector<std::string>& inputs,
     return alike;
 }
 
-void rememberNumberedInputs(const std::vector<NamedPath>& inputs) {
+void rememberInputs(const std::vector<NamedPath>& inputs, const std::vector<NamedPath>& outputs) {
+    const bool many = std::ranges::any_of(outputs, writesSeveral);
     for (const NamedPath& input : inputs) {
+        const auto same = [&](const NamedPath& o) { return samePath(o.path, input.path); };
+        // Devices and pipes have no place, and nothing to lose.
+        if (many && placeOf(input.path) && std::ranges::none_of(outputs, same))
+            rememberInput(input.path);
         if (!isNumberedFilm(input.path)) continue;
         // Where none is there, opening the input says so.
         if (const auto files = numberedFiles(input.path))

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,12 +23,21 @@ struct NamedPath {
 /// and pipes: several may write to /dev/null. Numbered names are taken as they are.
 [[nodiscard]] std::optional<std::string> placeOf(const std::string& path);
 
+/// The path from the root, without links as far as it is there, and without a slash at its end.
+[[nodiscard]] std::filesystem::path wholePath(const std::string& path);
+
+/// Whether an input names a film of numbered files: a file may have such a name itself.
+[[nodiscard]] bool isNumberedFilm(const std::string& path);
+
+/// Whether it names standard output, whatever that leads to.
+[[nodiscard]] bool isStandardOutput(std::string_view path);
+
 /// Whether both names are of one file or folder, by placeOf().
 [[nodiscard]] bool samePath(const std::string& a, const std::string& b);
 
 /// Errors (usage), before anything is written, where an output is an input, which would be lost, or
-/// another output, of which one would be. An input that is the main file of a folder, or COLMAP's
-/// folder in one, is that folder, too.
+/// another output, of which one would be, or where two are standard output, which would be mixed.
+/// An input that is the main file of a folder, or COLMAP's folder in one, is that folder, too.
 [[nodiscard]] Result<void> checkOutputNames(const std::vector<NamedPath>& outputs,
                                             const std::vector<NamedPath>& inputs);
 
@@ -40,8 +50,11 @@ struct NamedPath {
 /// The name of a file or folder without the folders that it is in.
 [[nodiscard]] std::string lastName(const std::string& path);
 
-/// Remembers the files of numbered inputs (`name_%04d.png`) as files that an input names.
-void rememberNumberedInputs(const std::vector<NamedPath>& inputs);
+/// Remembers the files of numbered inputs (`name_%04d.png`) as files that an input names. Where an
+/// output is numbered or a folder that is there, its files may have the names of inputs, which
+/// checkOutputNames() does not see: inputs are remembered then, but for those that an output
+/// replaces.
+void rememberInputs(const std::vector<NamedPath>& inputs, const std::vector<NamedPath>& outputs);
 
 /// Error (usage) where a report would be the main file of a folder that is an input or an output:
 /// an atlas' atlas.json, a set's transforms.json, cameras.json or files of COLMAP. It would be

@@ -182,7 +182,7 @@ int Program::run(const std::function<Result<int>()>& body) {
     try {
         // A report that cannot be written is an error before the work, not after it.
         const auto report =
-            common.report.empty() ? Result<void>() : checkTarget(common.report, *this);
+            common.report.empty() ? Result<void>() : checkFileTarget(common.report, *this);
         reportWritten_ = !report;  // there is no place for it
         const auto date = command.empty() ? Result<void>() : checkSourceDate();
         const auto input = takeStandardInput(job.limits);
@@ -448,9 +448,9 @@ Result<FolderTarget> folderTarget(const std::string& target, const std::vector<s
 
 Result<void> checkPlotTarget(std::string_view option, const std::string& target, Program& program) {
     if (target.empty()) return {};
-    if (!target.ends_with(".svg"))
+    if (lowerExtension(target) != ".svg")
         return fail(ErrorCode::usage, "{} is '{}'; its name must end in .svg", option, target);
-    return checkTarget(target, program);
+    return checkFileTarget(target, program);
 }
 
 Result<void> checkTarget(const std::filesystem::path& target, Program& program) {
@@ -463,6 +463,16 @@ Result<void> checkTarget(const std::filesystem::path& target, Program& program) 
         return fail(ErrorCode::io, "'{}' exists and --no-clobber forbids to replace it",
                     target.string());
     return checkIsNotNamed(target);
+}
+
+Result<void> checkFileTarget(const std::filesystem::path& target, Program& program) {
+    std::error_code ec;
+    const bool numbered = frameName(target.string(), 0).has_value();
+    if (target != "-" && !numbered && std::filesystem::is_directory(target, ec))
+        return fail(ErrorCode::io, "cannot write '{}': it is a folder", target.string());
+    if (!target.has_filename())
+        return fail(ErrorCode::io, "cannot write '{}': it names no file", target.string());
+    return checkTarget(target, program);
 }
 
 }  // namespace stx::tools

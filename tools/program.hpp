@@ -131,6 +131,9 @@ struct FolderTarget {
 /// the target's folder; (io) under --no-clobber, when the target exists; (usage) several numbers in
 /// its name.
 [[nodiscard]] Result<void> checkTarget(const std::filesystem::path& target, Program& program);
+/// checkTarget() of what can only be a file; errors (io), too, where it is a folder, or is named as
+/// one. Standard output and numbered names are fine.
+[[nodiscard]] Result<void> checkFileTarget(const std::filesystem::path& target, Program& program);
 /// The same of a plot, where one was asked for; errors (usage) also when it is no .svg.
 [[nodiscard]] Result<void> checkPlotTarget(std::string_view option, const std::string& target,
                                            Program& program);

@@ -1,5 +1,7 @@
 #include "tools/report_merge.hpp"
 
+#include <algorithm>
+
 namespace stx::tools {
 namespace {
 
@@ -76,6 +78,27 @@ Result<void> MergedReport::addEntry(Json entry, std::size_t total) {
     return {};
 }
 
+/// Throws Json::exception where they are none.
+void MergedReport::addStages(const Json& stages) {
+    if (stages_.is_null()) stages_ = Json::array();
+    for (const Json& stage : stages) {
+        const auto known = std::ranges::find_if(stages_, [&](const Json& s) {
+            return s.at("name") == stage.at("name") && s.at("once") == stage.at("once");
+        });
+        if (known == stages_.end()) {
+            stages_.push_back(stage);
+            continue;
+        }
+        Json& all = *known;
+        all["milliseconds"] =
+            all.at("milliseconds").get<double>() + stage.at("milliseconds").get<double>();
+        // What is done once for all pictures is done by each run to the same pixels.
+        const auto before = all.at("pixels").get<std::uint64_t>();
+        const auto more = stage.at("pixels").get<std::uint64_t>();
+        all["pixels"] = stage.at("once").get<bool>() ? std::max(before, more) : before + more;
+    }
+}
+
 Result<void> MergedReport::addPictures(Json report) {
     const auto shard = report.find("shard");
     if (shard == report.end() || !shard->is_object())
@@ -90,8 +113,8 @@ Result<void> MergedReport::addPictures(Json report) {
         if (!view.is_object()) return fail(ErrorCode::invalidInput, "a view is not an object");
         STX_CHECK(addEntry(std::move(view), total));
     }
-    report.erase("views");
-    report.erase("shard");
+    if (const auto stages = report.find("stages"); stages != report.end()) addStages(*stages);
+    for (const char* key : {"views", "shard", "stages"}) report.erase(key);
     // An empty shard has drawn nothing and does not know by what.
     if (head_.is_null() || head_.value("backend", "").empty()) head_ = std::move(report);
     return {};
@@ -210,7 +233,9 @@ std::string MergedReport::text() const {
         return lines;
     }
     // The last key is the list, so that its entries need not be parsed again.
-    std::string head = head_.dump(2, ' ', false, Json::error_handler_t::replace);
+    Json whole = head_;
+    if (!stages_.is_null()) whole["stages"] = stages_;
+    std::string head = whole.dump(2, ' ', false, Json::error_handler_t::replace);
     head.resize(head.rfind('\n'));
     lines = head + ",\n  \"views\": [";
     for (const auto& [index, entry] : entries_)

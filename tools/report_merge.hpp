@@ -15,6 +15,7 @@ namespace stx::tools {
 /// Reports of shards (`--shard K/N --report`), joined: lines of `stx convert` or `stx validate`, or
 /// reports of `stx render`. Of an input or picture that several runs report, as when one was
 /// stopped and started again, the best is taken: ok, then skipped, then error; of equals the later.
+/// Stages (`--explain`) are those of all runs together.
 class MergedReport {
   public:
     /// Adds the text of one report. Errors (invalidInput): neither of the two, no shard's, another
@@ -59,6 +60,7 @@ class MergedReport {
     };
     [[nodiscard]] Result<void> addEntry(nlohmann::ordered_json entry, std::size_t total);
     [[nodiscard]] Result<void> addPictures(nlohmann::ordered_json report);
+    void addStages(const nlohmann::ordered_json& stages);
     [[nodiscard]] Result<void> expect(Kind kind, std::size_t total);
     /// Errors when a report's shard tells of another job than those before it.
     [[nodiscard]] Result<void> expectJob(const nlohmann::ordered_json& shard);
@@ -67,7 +69,8 @@ class MergedReport {
     std::size_t total_ = 0;
     std::string job_;  ///< of the shards; reports of earlier versions do not tell it
     std::map<std::size_t, Entry> entries_;
-    nlohmann::ordered_json head_;  ///< of pictures: the report without them
+    nlohmann::ordered_json head_;    ///< of pictures: the report without them and `stages_`
+    nlohmann::ordered_json stages_;  ///< of pictures; null where no report has any
     std::vector<std::string> failedRuns_;
 };
 

@@ -18,6 +18,7 @@ struct NamedFiles {
     std::atomic<bool> guarded = false;
     std::mutex mutex;
     std::set<FileNumber> numbers;
+    std::set<FileNumber> inputs;
     std::multiset<FileNumber> ofFilms;
 };
 NamedFiles& namedFiles() {
@@ -31,19 +32,27 @@ std::optional<FileNumber> numberOf(const std::filesystem::path& file) {
     return FileNumber(status.st_dev, status.st_ino);
 }
 
+void remember(const std::filesystem::path& file, std::set<FileNumber> NamedFiles::*among) {
+    NamedFiles& all = namedFiles();
+    if (!all.guarded) return;
+    const auto number = numberOf(file);
+    if (!number) return;
+    const std::lock_guard lock(all.mutex);
+    (all.*among).insert(*number);
+}
+
 }  // namespace
 
 void guardNamedFiles() {
     namedFiles().guarded = true;
 }
 
+void rememberInput(const std::filesystem::path& file) {
+    remember(file, &NamedFiles::inputs);
+}
+
 void rememberNamedFile(const std::filesystem::path& file) {
-    NamedFiles& all = namedFiles();
-    if (!all.guarded) return;
-    const auto number = numberOf(file);
-    if (!number) return;
-    const std::lock_guard lock(all.mutex);
-    all.numbers.insert(*number);
+    remember(file, &NamedFiles::numbers);
 }
 
 FilesOfFilm::FilesOfFilm(const std::vector<std::filesystem::path>& files) {
@@ -67,6 +76,10 @@ Result<void> checkIsNotNamed(const std::filesystem::path& target) {
     const auto number = numberOf(target);
     if (!number) return {};
     const std::lock_guard lock(all.mutex);
+    if (all.inputs.contains(*number))
+        return fail(ErrorCode::usage,
+                    "'{}' is an input, which would be lost; give the output another name",
+                    target.string());
     const bool named = all.numbers.contains(*number);
     if (!named && !all.ofFilms.contains(*number)) return {};
     std::error_code ec;

@@ -18,6 +18,10 @@ namespace stx {
 /// programs that end with their job; a library's caller may replace a file that it has read.
 void guardNamedFiles();
 
+/// Called for an input itself, where outputs may get its name one by one: the files of a pattern
+/// (`render x_2.exr -o x_%d.exr`), or those in a folder. Not where an output may replace it.
+void rememberInput(const std::filesystem::path& file);
+
 /// Called for each file that is found by a name in another (resolveInside()), in a folder or by a
 /// pattern, whose files may be folders. From any thread.
 void rememberNamedFile(const std::filesystem::path& file);
@@ -35,8 +39,8 @@ class FilesOfFilm {
     std::vector<std::pair<dev_t, ino_t>> numbers_;
 };
 
-/// Errors (usage) where the file or folder that would be replaced is one that an input names, or
-/// one of a film that is open.
+/// Errors (usage) where the file or folder that would be replaced is an input, one that an input
+/// names, or one of a film that is open.
 [[nodiscard]] Result<void> checkIsNotNamed(const std::filesystem::path& target);
 
 }  // namespace stx

@@ -16,7 +16,8 @@ struct ValidateOptions {
 };
 
 /// Every rule that a file breaks, in its order; empty when it breaks none. For .mp4, .bt, .xmt,
-/// bundles and atlases in OpenEXR, atlas folders, image sets; of a mesh, whether it can be read.
+/// bundles and atlases in OpenEXR, atlas folders, image sets (each frame of one that moves); of a
+/// mesh, whether it can be read.
 /// Reading goes on behind a broken rule as far as it can; what cannot be read at all breaks rule
 /// 1001. Errors: (io) the file does not exist or cannot be opened; (invalidInput) it is a picture;
 /// (usage) an image set of a kind that needs options; (failed) stopped.

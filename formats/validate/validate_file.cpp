@@ -1,4 +1,8 @@
+#include <algorithm>
+#include <functional>
+#include <iterator>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "formats/any/open.hpp"
@@ -13,27 +17,10 @@
 namespace stx {
 namespace {
 
-/// Missing files first, all of them; the pixels only when there are none.
-Result<std::vector<Finding>> validateImageSet(const std::filesystem::path& path,
-                                              const ValidateOptions& options, Job& job) {
-    const auto set = summariseImageSet(path, job);
-    if (!set) return unreadable(set.error());
-    Findings findings;
-    for (std::size_t i = 0; i < set->views.size(); ++i)
-        for (const std::string& name : set->views[i].missing)
-            findings.add(1003, viewText(i, set->views[i].name), fmt::format("no file '{}'", name),
-                         "the file");
-    if (!findings.list.empty() || !options.pixels) return findings.list;
-    auto views = [&]() -> Result<std::vector<Finding>> {
-        ImageSetOptions asGiven;
-        asGiven.refine.set(RefineStep::poses, false);
-        STX_TRY(const auto table, openSetViews(path, asGiven, job, heldWhole(job.limits)));
-        return validateViews(*table, job);
-    }();
-    if (views) return views;
-    // Without --depth-range and the like the set is not wrong, but cannot be read.
-    if (views.error().code == ErrorCode::usage) return views;
-    Error error = views.error();
+/// What is left of a set whose reading ended with an error: the error itself (usage) where the set
+/// is not wrong, but needs --depth-range and the like; else a finding of rule 1001.
+Result<std::vector<Finding>> ofUnreadSet(Error error) {
+    if (error.code == ErrorCode::usage) return tl::unexpected(std::move(error));
     if (error.code == ErrorCode::io) error.code = ErrorCode::invalidInput;
     return unreadable(error);
 }
@@ -54,6 +41,68 @@ void forgiveEmptyFrames(std::vector<std::vector<Finding>>& files) {
         });
 }
 
+/// Findings of each part of a film, with its name, as one list.
+std::vector<Finding> ofAllParts(std::vector<std::vector<Finding>> each,
+                                const std::function<std::string(std::size_t)>& nameOf) {
+    forgiveEmptyFrames(each);
+    std::vector<Finding> all;
+    for (std::size_t i = 0; i < each.size(); ++i) {
+        for (Finding& finding : each[i]) {
+            const std::string name = nameOf(i);
+            finding.where = finding.where.empty() ? name : name + ": " + finding.where;
+            all.push_back(std::move(finding));
+        }
+    }
+    return all;
+}
+
+/// Each frame of a set that moves. A picture that cannot be read is a finding once, at the first
+/// moment that shows it.
+Result<std::vector<Finding>> validateSetFrames(const std::filesystem::path& path,
+                                               ImageSetOptions set, Job& job) {
+    set.strict = true;  // the frame before in its place would be sound
+    STX_TRY(const auto frames, openImageSet(path, set, job));
+    std::vector<std::vector<Finding>> each(frames->timeline().count());
+    std::set<std::string> said;
+    for (std::size_t i = 0; i < each.size(); ++i) {
+        STX_CHECK(job.checkCancelled());
+        // What is noted of one frame would be noted of all.
+        Job quiet;
+        quiet.workFor(job);
+        auto found = [&]() -> Result<std::vector<Finding>> {
+            STX_TRY(const auto table, frames->views(i, i == 0 ? job : quiet));
+            return validateViews(*table, i == 0 ? job : quiet);
+        }();
+        if (!found) {
+            STX_SET(found, ofUnreadSet(found.error()));
+            std::erase_if(*found, [&](const Finding& f) { return !said.insert(f.text()).second; });
+        }
+        each[i] = std::move(*found);
+    }
+    return ofAllParts(std::move(each), [&](std::size_t i) { return frames->timeline().nameOf(i); });
+}
+
+/// Missing files first, all of them; the pixels only when there are none.
+Result<std::vector<Finding>> validateImageSet(const std::filesystem::path& path,
+                                              const ValidateOptions& options, Job& job) {
+    const auto set = summariseImageSet(path, job);
+    if (!set) return unreadable(set.error());
+    Findings findings;
+    for (std::size_t i = 0; i < set->views.size(); ++i)
+        for (const std::string& name : set->views[i].missing)
+            findings.add(1003, viewText(i, set->views[i].name), fmt::format("no file '{}'", name),
+                         "the file");
+    if (!findings.list.empty() || !options.pixels) return findings.list;
+    ImageSetOptions asGiven;
+    asGiven.refine.set(RefineStep::poses, false);
+    auto found = [&]() -> Result<std::vector<Finding>> {
+        if (set->timeline.moves()) return validateSetFrames(path, asGiven, job);
+        STX_TRY(const auto table, openSetViews(path, asGiven, job, heldWhole(job.limits)));
+        return validateViews(*table, job);
+    }();
+    return found ? std::move(found) : ofUnreadSet(found.error());
+}
+
 /// Each file of a film, its findings with its name, and files that are missing between others.
 Result<std::vector<Finding>> validateNumbered(const std::filesystem::path& path,
                                               const ValidateOptions& options, Job& job) {
@@ -68,14 +117,10 @@ Result<std::vector<Finding>> validateNumbered(const std::filesystem::path& path,
         STX_TRY(auto found, validateFile(file.path, options, job));
         each.push_back(std::move(found));
     }
-    forgiveEmptyFrames(each);
-    for (std::size_t i = 0; i < files.size(); ++i) {
-        for (Finding& finding : each[i]) {
-            const std::string name = fmt::format("'{}'", files[i].path.filename().string());
-            finding.where = finding.where.empty() ? name : name + ": " + finding.where;
-            findings.list.push_back(std::move(finding));
-        }
-    }
+    auto ofFiles = ofAllParts(std::move(each), [&](std::size_t i) {
+        return fmt::format("'{}'", files[i].path.filename().string());
+    });
+    std::ranges::move(ofFiles, std::back_inserter(findings.list));
     return findings.list;
 }
 

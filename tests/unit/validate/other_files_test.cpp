@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "formats/any/save.hpp"
+#include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/validate/validate.hpp"
@@ -62,6 +63,50 @@ TEST(ValidateImageSets, WhatCannotBeReadBreaksRule1001) {
     EXPECT_EQ(rulesOf(folder / "set"), Numbers{1001});
     std::ofstream(folder / "set/transforms.json") << "{";
     EXPECT_EQ(rulesOf(folder / "set"), Numbers{1001});
+}
+
+/// A set of two cameras at three moments. The second sees nothing at the second one.
+void writeMovingSet(const TemporaryFolder& folder) {
+    Job job;
+    for (int k = 0; k < 3; ++k) {
+        Bundle bundle = smallBundle(2, 16, false, false);
+        // Frames that repeat the one before have no files of their own.
+        for (ReferenceView& view : bundle.views)
+            for (glm::u8vec4& colour : view.texture.rgba8()->pixels())
+                if (colour.a > 0) colour.r = static_cast<std::uint8_t>(60 * k);
+        if (k == 1) {
+            ReferenceView& empty = bundle.views[1];
+            for (float& d : empty.depth.pixels()) d = kNoDepth;
+            for (glm::u8vec4& colour : empty.texture.rgba8()->pixels()) colour = {};
+        }
+        const auto file = folder / fmt::format("f_{}.exr", k);
+        const auto saved = saveBundle(bundle, file, {}, job);
+        ASSERT_TRUE(saved) << saved.error().text();
+    }
+    const auto film = openSequence(folder / "f_%d.exr", {}, job);
+    ASSERT_TRUE(film) << film.error().text();
+    const auto written = exportFrames(**film, folder / "set", {}, job);
+    ASSERT_TRUE(written) << written.error().text();
+}
+
+TEST(ValidateImageSets, EachFrameOfOneThatMovesIsRead) {
+    const TemporaryFolder folder;
+    Job job;
+    ASSERT_NO_FATAL_FAILURE(writeMovingSet(folder));
+    const auto sound = validateFile(folder / "set", {}, job);
+    EXPECT_EQ(numbersOf(sound), Numbers{}) << textOf(sound);
+    for (const char* name : {"view_0_0000.png", "view_1_0002.png"}) {
+        const auto picture = folder / "set/images" / name;
+        ASSERT_TRUE(std::filesystem::exists(picture)) << name;
+        std::ofstream(picture) << "not a picture";
+    }
+    const auto findings = validateFile(folder / "set", {}, job);
+    ASSERT_TRUE(findings) << findings.error().text();
+    EXPECT_EQ(numbersOf(*findings), Numbers{1001}) << textOf(*findings);
+    ASSERT_EQ(findings->size(), 2u) << textOf(*findings);
+    EXPECT_TRUE(findings->at(0).where.starts_with("frame 0 (0 s)")) << textOf(*findings);
+    EXPECT_TRUE(findings->at(1).where.starts_with("frame 2 (0.08 s)")) << textOf(*findings);
+    EXPECT_NE(textOf(*findings).find("view_1_0002.png"), std::string::npos) << textOf(*findings);
 }
 
 TEST(ValidateMeshes, AreReadOrBreakRule1001) {
