@@ -34,7 +34,8 @@ Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
                                          32, "the picture"));
     if (mesh.splats) {
         STX_TRY(auto drawn, drawSplats(*mesh.splats, camera, settings.normals, job));
-        if (!settings.lighting.beyondOne) clip(drawn.colour);
+        // Brighter than white is not clipped here, but by what makes codes of it, once all that is
+        // behind has been added (Kerbl et al. 2023).
         const auto lit = settings.lighting.on() ? drawn.colour : Image<glm::vec4>();
         return RasterImage{drawn.colour, lit, drawn.depth, drawn.normal, {}, {}};
     }

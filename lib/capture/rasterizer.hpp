@@ -23,7 +23,8 @@ struct RasterSettings {
 /// coverage are box-filtered over the pixel, so an edge pixel can have coverage but no depth.
 struct RasterImage {
     /// sRGB-coded, premultiplied by coverage (alpha), 0..1; what is brighter than white is clipped
-    /// when all surfaces are blended, or goes on beyond 1 (Lighting::beyondOne).
+    /// when all surfaces are blended, or goes on beyond 1 (Lighting::beyondOne, and always of
+    /// splats, which are clipped once a background has been put behind them).
     Image<glm::vec4> colour;
     Image<glm::vec4> lit;  ///< the same under RasterSettings::lighting; empty when that is off
     Image<float> depth;    ///< planar distance; kNoDepth where the centre misses
