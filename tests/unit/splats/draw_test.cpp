@@ -11,6 +11,7 @@
 #include "lib/geometry/depth_code.hpp"
 #include "lib/model/texture.hpp"
 #include "lib/render/api/frame_picture.hpp"
+#include "lib/render/mesh/mesh_renderer.hpp"
 #include "lib/splats/draw.hpp"
 #include "tests/every_target.hpp"
 #include "tests/unit/splats/random_cloud.hpp"
@@ -257,7 +258,31 @@ TEST(DrawSplats, LinearColoursAreBlendedAsLight) {
     Job job;
     const auto drawn = drawSplats(cloud, cameraFrom({0, 0, 3}, 21, 21), false, job);
     const glm::vec4 middle = drawn->colour.at(10, 10);
-    EXPECT_NEAR(middle.x / middle.w, srgbFromLinear(0.2f), 1e-4f);
+    EXPECT_NEAR(middle.x / middle.w, 0.2f, 1e-4f);
+}
+
+TEST(DrawSplats, WhatIsBehindLinearColoursIsAddedAsLight) {
+    Mesh mesh;
+    auto cloud = disc({0, 0, 1});
+    cloud.linear = true;
+    cloud.opacities[0] = 0.8f;
+    cloud.colours[0] = glm::vec3(0.2f);
+    mesh.splats = std::make_shared<const SplatCloud>(cloud);
+    mesh.positions = {{0, 0, 0}};
+    mesh.points = {0};
+    Job job;
+    const Camera camera = cameraFrom({0, 0, 3}, 21, 21);
+    const auto frame = makeMeshRenderer(mesh, {}, job)->render(camera);
+    ASSERT_TRUE(frame);
+    EXPECT_TRUE(frame->linear);
+    const float alpha = frame->colour.at(10, 10).w;
+    EXPECT_NEAR(rgba8From(*frame, glm::vec3(1.0f)).at(10, 10).r,
+                255 * srgbFromLinear(0.2f * alpha + 1.0f - alpha), 1);
+    // Views hold codes.
+    const auto view = captureView(mesh, camera, "v", {}, job);
+    ASSERT_TRUE(view) << view.error().text();
+    EXPECT_FALSE(view->texture.isLinear());
+    EXPECT_NEAR(view->texture.at(10, 10).x, srgbFromLinear(0.2f), 1.0 / 255);
 }
 
 TEST(DrawSplats, BrighterThanWhiteIsClippedBehindTheBackground) {
