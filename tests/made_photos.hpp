@@ -180,16 +180,23 @@ inline std::string md5(std::string_view text) {
 
 /// GDepth: a picture in front, the depth and, where there is one, the sharp original in extended
 /// XMP of parts of `part` bytes. `attributes`: what else its XMP says. `segments` come before.
+/// `lineEnd` stands behind each 76 letters of base64.
 inline Bytes gdepthPhoto(const Bytes& shown, const std::string& format, ByteSpan depth,
                          const Bytes& sharp, const std::string& attributes, std::size_t part,
-                         std::vector<Bytes> segments = {}) {
+                         std::vector<Bytes> segments = {}, const std::string& lineEnd = "") {
+    const auto base64 = [&](ByteSpan bytes) {
+        const std::string line = encodeBase64(bytes);
+        if (lineEnd.empty()) return line;
+        std::string lines;
+        for (std::size_t at = 0; at < line.size(); at += 76) lines += line.substr(at, 76) + lineEnd;
+        return lines;
+    };
     const std::string spaces =
         "xmlns:D=\"http://ns.google.com/photos/1.0/depthmap/\" "
         "xmlns:I=\"http://ns.google.com/photos/1.0/image/\" "
         "xmlns:N=\"http://ns.adobe.com/xmp/note/\" ";
-    const std::string extended =
-        rdf(spaces + "D:Data=\"" + encodeBase64(depth) + "\"" +
-            (sharp.empty() ? "" : " I:Data=\"" + encodeBase64(sharp) + "\""));
+    const std::string extended = rdf(spaces + "D:Data=\"" + base64(depth) + "\"" +
+                                     (sharp.empty() ? "" : " I:Data=\"" + base64(sharp) + "\""));
     const std::string guid = md5(extended);
     segments.push_back(xmpSegment(rdf(spaces + "D:Format=\"" + format + "\" " + attributes +
                                       " N:HasExtendedXMP=\"" + guid + "\"")));

@@ -179,9 +179,19 @@ struct Extracted {
     std::int64_t points = 0;
 };
 
-void noteTranslucentPoints(Job& job) {
-    job.note("points of translucent surfaces are opaque in the file");
-}
+/// What the points of views lose in a file.
+struct PointLosses {
+    std::atomic<bool> translucent = false, beyondWhite = false;
+
+    void look(const ReferenceView& view) {
+        if (hasTranslucentInside(view.texture, view.depth)) translucent = true;
+        if (isBeyondWhite(view.texture)) beyondWhite = true;
+    }
+    void note(Job& job) const {
+        if (translucent) job.note("points of translucent surfaces are opaque in the file");
+        if (beyondWhite) Rgba8Loss{.linear = true, .clipped = true}.note(job);
+    }
+};
 
 /// A .ply, view by view.
 Result<Extracted> extractPly(const ExtractOptions& o, const PeakMemory& takes, Sequence& frames,
@@ -196,12 +206,12 @@ Result<Extracted> extractPly(const ExtractOptions& o, const PeakMemory& takes, S
     STX_TRY(auto file, PlyInParts::create(o.output, {count, normals, true, false, origin},
                                           program.outputOptions()));
     std::vector<Bytes> rows(table->count());
-    std::atomic<bool> translucent = false;
+    PointLosses losses;
     const auto encode = [&](std::size_t i,
                             const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
         Points points;
         points.add(*view, normals);
-        if (hasTranslucentInside(view->texture, view->depth)) translucent = true;
+        losses.look(*view);
         STX_TRY(rows[i], file.encode(points.cloud(origin)));
         return {};
     };
@@ -210,7 +220,7 @@ Result<Extracted> extractPly(const ExtractOptions& o, const PeakMemory& takes, S
     };
     STX_CHECK(forEachView(*table, takes, program.job, encode, add));
     STX_CHECK(file.commit());
-    if (translucent) noteTranslucentPoints(program.job);
+    losses.note(program.job);
     return Extracted{counted(count, "point"), table->count(), static_cast<std::int64_t>(count)};
 }
 
@@ -222,11 +232,12 @@ Result<Extracted> extractPoints(const ExtractOptions& o, const PeakMemory& takes
     bundle.noteMaterialLeftOut(program.job);
     const bool normals = std::ranges::all_of(bundle.views, &ReferenceView::hasNormals);
     Points found;
-    for (const ReferenceView& view : bundle.views) found.add(view, normals);
-    if (std::ranges::any_of(bundle.views, [](const ReferenceView& view) {
-            return hasTranslucentInside(view.texture, view.depth);
-        }))
-        noteTranslucentPoints(program.job);
+    PointLosses losses;
+    for (const ReferenceView& view : bundle.views) {
+        found.add(view, normals);
+        losses.look(view);
+    }
+    losses.note(program.job);
     PointWriteOptions write = o.points;
     write.file.noClobber = program.common.noClobber;
     STX_CHECK(writePoints(o.output, found.cloud(bundle.origin), program.job, write));

@@ -196,10 +196,12 @@ bool mayHoldReport(const std::string& report, const std::vector<NamedPath>& othe
 
 std::string endingOfMedia(std::string_view path) {
     static constexpr std::string_view kEndings[] = {
-        ".png",  ".jpg", ".jpeg", ".heic", ".tif", ".tiff", ".webp", ".exr", ".hdr", ".svg",
-        ".mp4",  ".bt",  ".xmt",  ".obj",  ".mtl", ".glb",  ".gltf", ".stl", ".ply", ".spz",
-        ".drc",  ".off", ".dae",  ".fbx",  ".zip", ".tar",  ".gz",   ".yuv", ".y4m", ".pfm",
-        ".html", ".bin", ".tga",  ".bmp",  ".gif", ".psd",  ".mkv",  ".mov", ".avi", ".webm"};
+        ".png", ".jpg", ".jpeg", ".heic", ".tif",   ".tiff",   ".webp", ".exr",  ".hdr",
+        ".svg", ".mp4", ".bt",   ".xmt",  ".obj",   ".mtl",    ".glb",  ".gltf", ".stl",
+        ".ply", ".spz", ".drc",  ".off",  ".dae",   ".fbx",    ".zip",  ".tar",  ".gz",
+        ".yuv", ".y4m", ".pfm",  ".html", ".bin",   ".tga",    ".bmp",  ".gif",  ".psd",
+        ".mkv", ".mov", ".avi",  ".webm", ".splat", ".ksplat", ".sog",  ".las",  ".laz",
+        ".xyz", ".pcd", ".pts",  ".e57",  ".usd",   ".usdz",   ".3mf"};
     const std::string ending = fs::path(path).extension().string();
     const bool known =
         std::ranges::any_of(kEndings, [&](auto e) { return equalNoCase(e, ending); });

@@ -136,7 +136,9 @@ Result<FileKind> recognise(const fs::path& path) {
     // Matroska: Azure Kinect records in it.
     if (startsWith(head, "\x1a\x45\xdf\xa3")) return FileKind::imageSet;
     if (mpeg4ContainerOf(ByteSpan(head)) || mpeg4ContainerOf(path)) return FileKind::mpeg4;
-    if (startsWith(head, "\x89PNG")) return FileKind::image;
+    // As `stx extract -o NAME.png` writes it; a PNG has no depth itself.
+    if (startsWith(head, "\x89PNG"))
+        return imagesets::depthBeside(path).empty() ? FileKind::image : FileKind::photo;
     if (isMesh(path, head)) return FileKind::mesh;
     // .freiburg: the lists of camera poses of TUM's and ICL-NUIM's recordings.
     // .log: those of Open3D's.

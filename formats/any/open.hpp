@@ -19,7 +19,7 @@ enum class FileKind {
     exr,       ///< a bundle as multi-part OpenEXR
     atlas,     ///< a folder with atlas.json (or that file), or an atlas .exr
     imageSet,  ///< a calibrated set of images with depth: a folder or its camera file
-    photo,     ///< a JPEG or HEIC, which may hold depth
+    photo,     ///< a JPEG or HEIC, which may hold depth; a PNG with depth beside it
     image,     ///< another plain picture
     numbered,  ///< `name_%04d.exr`, `atlas_%04d`: bundles or atlases, one for each frame
     unknown,

@@ -41,19 +41,6 @@ constexpr double kShortestFocal = 0.1;
 constexpr const char* kDepthEndings[] = {"_depth.tiff", "_depth.tif", "_depth.exr",
                                          "_depth.pfm",  "_depth.png", "_depth.jpg"};
 
-/// The depth picture that lies beside NAME_image.jpg or NAME.jpg; empty: none does.
-path depthBeside(const path& picture) {
-    std::string stem = picture.stem().string();
-    constexpr std::string_view kImage = "_image";
-    if (stem.ends_with(kImage)) stem.resize(stem.size() - kImage.size());
-    std::error_code ec;
-    for (const char* ending : kDepthEndings) {
-        path file = folderOf(picture) / (stem + ending);
-        if (std::filesystem::is_regular_file(file, ec)) return file;
-    }
-    return {};
-}
-
 /// The file that --depth names, beside the photo or where stx runs.
 path namedDepth(const path& picture, std::string name) {
     if (const auto at = name.find("{stem}"); at != std::string::npos)
@@ -367,6 +354,18 @@ Result<OpenedPhoto> openGiven(const path& given, const ImageSetOptions& options,
 }
 
 }  // namespace
+
+path depthBeside(const path& picture) {
+    std::string stem = picture.stem().string();
+    constexpr std::string_view kImage = "_image";
+    if (stem.ends_with(kImage)) stem.resize(stem.size() - kImage.size());
+    std::error_code ec;
+    for (const char* ending : kDepthEndings) {
+        path file = folderOf(picture) / (stem + ending);
+        if (std::filesystem::is_regular_file(file, ec)) return file;
+    }
+    return {};
+}
 
 Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& options, Job& job) {
     const std::string where = inQuotes(given.string());

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -75,6 +76,35 @@ double colourScale(PlyType type) {
             return 255.0;
     }
 }
+
+/// Colours that a PLY file holds as 16 bits. Some programs write those of 8 bits so.
+class ColoursOf16Bits {
+  public:
+    void add(Role role, PlyType type, double value) {
+        if (type != PlyType::uint16) return;
+        is_[channelOf(role)] = true;
+        largest_ = std::max(largest_, value);
+    }
+    /// Makes colours that were divided by 65535 those of 255 where all are bytes; a note says so.
+    void widenBytes(std::vector<glm::vec4>& colours, Job& job) const {
+        // A cloud of which nothing is brighter than 255 of 65535 would be black. 0 and 1 may mean
+        // anything.
+        if (!(largest_ > 1 && largest_ <= 255)) return;
+        // By their whole numbers, so that full stays full.
+        for (glm::vec4& c : colours)
+            for (int k = 0; k < 4; ++k)
+                if (is_[k]) c[k] = std::round(c[k] * 65535.0f) / 255.0f;
+        job.note(
+            fmt::format("the 16-bit colours of the PLY file reach {} of 65535 only: they are taken "
+                        "for 8 bits, 0 to 255",
+                        largest_));
+    }
+    static int channelOf(Role role) { return static_cast<int>(role) - static_cast<int>(Role::red); }
+
+  private:
+    std::array<bool, 4> is_{};
+    double largest_ = 0;
+};
 
 bool hasRole(const PlyElement& ofVertices, Role role) {
     return std::ranges::any_of(ofVertices.properties,
@@ -217,6 +247,7 @@ class PlyReader {
                 }
                 STX_TRY(double number, value(element, i, p.type));
                 if (roles[k] >= Role::red && roles[k] <= Role::alpha) {
+                    colours16_.add(roles[k], p.type, number);
                     number /= colourScale(p.type);
                     floatColours_ = floatColours_ || colourScale(p.type) == 1.0;
                 }
@@ -242,6 +273,7 @@ class PlyReader {
             for (auto& c : colours_)
                 c = glm::vec4(glm::clamp(glm::vec3(c) * kHarmonic + 0.5f, 0.0f, 1.0f), 1.0f);
         }
+        if (!splats) colours16_.widenBytes(colours_, files_.job());
         linearFromSrgbColours(colours_, floatColours_ && !splats);
         noteDropped(element, splats);
         return {};
@@ -269,8 +301,8 @@ class PlyReader {
                         face.texture =
                             number >= 0 ? static_cast<std::uint32_t>(number) : kNoTexture;
                     if (role >= Role::red && role <= Role::alpha) {
-                        colour[static_cast<int>(role) - static_cast<int>(Role::red)] =
-                            number / colourScale(p.type);
+                        faceColours16_.add(role, p.type, number);
+                        colour[ColoursOf16Bits::channelOf(role)] = number / colourScale(p.type);
                         hasFaceColours_ = hasFaceColours_ || role == Role::green;
                         floatFaceColours_ = floatFaceColours_ || colourScale(p.type) == 1.0;
                     }
@@ -396,6 +428,7 @@ class PlyReader {
         if (useFaceColours) {
             std::vector<glm::vec4> colours;
             for (const auto& f : faces_) colours.push_back(f.colour);
+            faceColours16_.widenBytes(colours, files_.job());
             noteAlpha(colours);
             linearFromSrgbColours(colours, floatFaceColours_);
             for (std::size_t i = 0; i < faces_.size(); ++i) faces_[i].colour = colours[i];
@@ -457,6 +490,7 @@ class PlyReader {
          hasFaceColours_ = false;
     std::uint32_t textured_ = 0;  ///< materials that may have a texture
     bool floatColours_ = false, floatFaceColours_ = false;
+    ColoursOf16Bits colours16_, faceColours16_;
     std::size_t shortFaces_ = 0;
 };
 

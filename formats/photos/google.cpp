@@ -35,8 +35,31 @@ Result<void> readRange(std::string_view format, double near, double far, double 
     return {};
 }
 
+/// An end of the range of depth: the number that a property of the XMP holds. Errors
+/// (invalidInput): it is missing or something else.
+Result<double> rangeEnd(const std::optional<std::string_view>& text, std::string_view name) {
+    constexpr std::size_t kShown = 40;  // letters of a text that may be any long
+    if (!text)
+        return fail(ErrorCode::invalidInput,
+                    "it has depth, but not its {}; a finite number is expected", name);
+    const auto numbers = numbersFrom(*text);
+    if (!numbers || numbers->size() != 1)
+        return fail(ErrorCode::invalidInput,
+                    "the {} of its depth is '{}'; a finite number like 0.5 is expected", name,
+                    text->substr(0, kShown));
+    return numbers->front();
+}
+
 /// A picture that the XMP holds as base64.
 Result<PhotoImage> pictureInText(std::string_view base64, std::string_view what) {
+    // Base64 of mails and of XML has lines of 76 letters.
+    constexpr std::string_view kBlanks = " \t\n\v\f\r";
+    std::string joined;
+    if (base64.find_first_of(kBlanks) != std::string_view::npos) {
+        joined = base64;
+        std::erase_if(joined, [&](char c) { return kBlanks.find(c) != std::string_view::npos; });
+        base64 = joined;
+    }
     auto bytes = decodeBase64(base64);
     if (!bytes) return fail(ErrorCode::invalidInput, "{} in its XMP is not base64", what);
     const auto owner = std::make_shared<const Bytes>(std::move(*bytes));
@@ -92,16 +115,13 @@ Result<bool> readGDepth(const JpegPhoto& jpeg, Photo& photo, const Limits& limit
         if (const auto found = jpeg.xmp->text(space, name)) return found;
         return jpeg.extended ? jpeg.extended->text(space, name) : std::nullopt;
     };
-    const auto number = [&](std::string_view name) {
-        const auto found = text(kGDepth, name);
-        const auto numbers = found ? numbersFrom(*found) : std::nullopt;
-        return numbers && numbers->size() == 1 ? numbers->front() : 0.0;
-    };
     const auto format = text(kGDepth, "Format");
     if (!format) return false;
     photo.format = "GDepth";
     const std::string_view units = text(kGDepth, "Units").value_or("");
-    STX_CHECK(readRange(*format, number("Near"), number("Far"), units == "mm" ? 0.001 : 1.0,
+    STX_TRY(const double near, rangeEnd(text(kGDepth, "Near"), "GDepth:Near"));
+    STX_TRY(const double far, rangeEnd(text(kGDepth, "Far"), "GDepth:Far"));
+    STX_CHECK(readRange(*format, near, far, units == "mm" ? 0.001 : 1.0,
                         text(kGDepth, "MeasureType").value_or(""), photo));
     photo.accuracy = units == "m" || units == "mm" ? "absolute" : "unscaled";
     const auto data = text(kGDepth, "Data");
@@ -110,7 +130,8 @@ Result<bool> readGDepth(const JpegPhoto& jpeg, Photo& photo, const Limits& limit
         return fail(ErrorCode::invalidInput,
                     "it tells of depth (GDepth:Format), but the depth itself (GDepth:Data) is "
                     "missing");
-    STX_CHECK(limits.checkAllocation(data->size(), 1, "its depth"));
+    // Without its line breaks, and decoded.
+    STX_CHECK(limits.checkAllocation(data->size(), 2, "its depth"));
     STX_TRY(photo.depth, pictureInText(*data, "its depth"));
     if (const auto sharp = text(kGImage, "Data"); sharp) {
         photo.colourIs = jpeg.options.portrait ? "portrait" : "original";
@@ -138,8 +159,8 @@ Result<bool> readDynamicDepth(const JpegPhoto& jpeg, Photo& photo) {
         return fail(ErrorCode::invalidInput,
                     "its depth is named '{}', but no item of its directory has that name", *uri);
     const std::string_view units = xmp.text(kDepthMap, "Units").value_or("");
-    double near = xmp.number(kDepthMap, "Near").value_or(0);
-    double far = xmp.number(kDepthMap, "Far").value_or(0);
+    STX_TRY(double near, rangeEnd(xmp.text(kDepthMap, "Near"), "DepthMap:Near"));
+    STX_TRY(double far, rangeEnd(xmp.text(kDepthMap, "Far"), "DepthMap:Far"));
     // Diopters are 1/m, so the nearest has the most. Phones that write them the other way round
     // mean some range of their own.
     const bool diopters = units == "Diopters" && near > far && far > 0;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "formats/files/no_case.hpp"
 #include "formats/photos/numbers.hpp"
 
 namespace stx::photos {
@@ -97,7 +98,7 @@ JpegSegments readJpegSegments(ByteSpan file) {
 Result<Bytes> extendedXmp(const JpegSegments& segments, std::string_view guid) {
     std::vector<const JpegSegments::Part*> parts;
     for (const auto& part : segments.extended)
-        if (part.guid == guid) parts.push_back(&part);
+        if (equalNoCase(part.guid, guid)) parts.push_back(&part);
     if (parts.empty())
         return fail(ErrorCode::invalidInput,
                     "its XMP goes on in segments with the mark {}, but there is none", guid);
@@ -118,7 +119,8 @@ Result<Bytes> extendedXmp(const JpegSegments& segments, std::string_view guid) {
     if (out.size() != total)
         return fail(ErrorCode::invalidInput, "its extended XMP has {} of {} bytes", out.size(),
                     total);
-    if (const std::string found = md5Of(out); found != guid)
+    // Adobe writes it in capitals; small letters are the same number.
+    if (const std::string found = md5Of(out); !equalNoCase(found, guid))
         return fail(ErrorCode::invalidInput,
                     "its extended XMP has the MD5 {}, but the mark {}: it is damaged", found, guid);
     return out;

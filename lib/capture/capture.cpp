@@ -156,6 +156,7 @@ Result<ReferenceView> capturedView(const Mesh& mesh, const Camera& camera, std::
     raster.materials = settings.materials;
     raster.lighting.beyondOne = true;
     STX_TRY(auto image, rasterise(mesh, camera, raster, job));
+    image.code();
     if (mesh.splats) faint.add(image);
     ReferenceView view;
     view.name = std::move(name);

@@ -3,6 +3,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/capture/material_sampler.hpp"
 #include "lib/capture/triangles.hpp"
+#include "lib/model/texture.hpp"
 #include "lib/splats/draw.hpp"
 
 namespace stx {
@@ -22,7 +23,24 @@ Result<RasterImage> rasterisedMesh(const Mesh& mesh, const Camera& camera,
     return rasteriseTriangles(solid, camera, settings, job);
 }
 
+/// Colours of linear light as sRGB-coded ones, under their coverage.
+void codeColours(Image<glm::vec4>& colour) {
+    parallelFor(0, colour.height(), 16, [&](int y) {
+        for (auto& c : colour.row(y)) {
+            if (!(c.w > 0.0f)) continue;
+            for (int k = 0; k < 3; ++k) c[k] = srgbFromLinear(c[k] / c.w) * c.w;
+        }
+    });
+}
+
 }  // namespace
+
+void RasterImage::code() {
+    if (!linear) return;
+    codeColours(colour);
+    codeColours(lit);
+    linear = false;
+}
 
 Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
                               const RasterSettings& settings, Job& job) {
@@ -34,9 +52,11 @@ Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
                                          32, "the picture"));
     if (mesh.splats) {
         STX_TRY(auto drawn, drawSplats(*mesh.splats, camera, settings.normals, job));
-        if (!settings.lighting.beyondOne) clip(drawn.colour);
+        // Brighter than white is not clipped here, but by what makes codes of it, once all that is
+        // behind has been added (Kerbl et al. 2023).
         const auto lit = settings.lighting.on() ? drawn.colour : Image<glm::vec4>();
-        return RasterImage{drawn.colour, lit, drawn.depth, drawn.normal, {}, {}};
+        return RasterImage{drawn.colour, lit, drawn.depth,        drawn.normal,
+                           {},           {},  mesh.splats->linear};
     }
     STX_CHECK(job.limits.checkAllocation(mesh.triangles.size(), memoryOfTriangle(), "the mesh"));
     STX_TRY(auto out, rasterisedMesh(mesh, camera, settings, job));

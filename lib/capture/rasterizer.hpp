@@ -22,8 +22,9 @@ struct RasterSettings {
 /// A mesh seen by a camera. Depth and normal belong to the pixel's centre exactly; colour and
 /// coverage are box-filtered over the pixel, so an edge pixel can have coverage but no depth.
 struct RasterImage {
-    /// sRGB-coded, premultiplied by coverage (alpha), 0..1; what is brighter than white is clipped
-    /// when all surfaces are blended, or goes on beyond 1 (Lighting::beyondOne).
+    /// sRGB-coded unless `linear`, premultiplied by coverage (alpha), 0..1; what is brighter than
+    /// white is clipped when all surfaces are blended, or goes on beyond 1 (Lighting::beyondOne,
+    /// and always of splats, which are clipped once a background has been put behind them).
     Image<glm::vec4> colour;
     Image<glm::vec4> lit;  ///< the same under RasterSettings::lighting; empty when that is off
     Image<float> depth;    ///< planar distance; kNoDepth where the centre misses
@@ -33,6 +34,10 @@ struct RasterImage {
     /// As in ReferenceView; empty unless asked for, and where no material of the mesh has them.
     Image<glm::vec2> metallicRoughness;
     Image<glm::vec3> emissive;
+    bool linear = false;  ///< colour and lit are linear light: of splats whose colours are
+
+    /// Makes colours that are linear light sRGB-coded ones, each under its coverage.
+    void code();
 };
 
 /// Rasterises a mesh (which must pass check()) exactly: no cracks along shared edges, no clipping

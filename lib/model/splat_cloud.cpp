@@ -98,16 +98,18 @@ Result<void> SplatCloud::dropBroken(Job& job) {
                         harmonics.begin() + static_cast<std::ptrdiff_t>(kept * padded));
         ++kept;
     }
+    if (count == 0)
+        return fail(ErrorCode::invalidInput, "there are no splats; at least one is expected");
     if (kept == 0)
         return fail(ErrorCode::invalidInput,
-                    "none of the {} splats can be drawn; finite positions, sizes, rotations, "
-                    "opacities and colours are expected",
-                    count);
+                    "none of the {} splats can be drawn; finite positions, rotations, opacities "
+                    "and colours, and sizes of at most {:g} are expected",
+                    count, kLargest);
     if (kept == count) return {};
     job.note(fmt::format(
-        "{} of {} splats left out: a value is not finite, a size or opacity is below 0 or a "
-        "rotation has no length",
-        count - kept, count));
+        "{} of {} splats left out: a value is not finite, a size is below 0 or above {:g}, an "
+        "opacity is below 0 or a rotation has no length",
+        count - kept, count, kLargest));
     positions.resize(kept);
     scales.resize(kept);
     rotations.resize(kept);

@@ -20,6 +20,14 @@ float linearFromSrgb(float coded) {
     return std::pow((coded + 0.055f) / 1.055f, 2.4f);
 }
 
+bool isBeyondWhite(const Texture& texture) {
+    constexpr float kWhite = 1.0f + 1e-6f;
+    const RgbaFloatImage* image = texture.rgbaFloat();
+    return image && std::ranges::any_of(image->pixels(), [](const glm::vec4& c) {
+               return c.a > 0.0f && std::max({c.r, c.g, c.b}) > kWhite;
+           });
+}
+
 Result<void> Texture::check() const {
     const auto* linear = rgbaFloat();
     if (!linear) return {};

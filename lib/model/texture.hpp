@@ -90,6 +90,10 @@ class Texture {
 [[nodiscard]] float srgbFromLinear(float linear);
 [[nodiscard]] float linearFromSrgb(float coded);
 
+/// Whether linear colour that shows (alpha above 0) is brighter than white by more than rounding
+/// makes it (1e-6): what holds sRGB of 0..1 clips it.
+[[nodiscard]] bool isBeyondWhite(const Texture& texture);
+
 /// Gives each pixel of alpha 0 the colour of the nearest covered ones, outward from the silhouette,
 /// so that bilinear and wider filters never mix in background. Alpha is left as it is. Pixels
 /// further than the object's reach get its mean colour, which keeps PNG and JPEG small.

@@ -24,6 +24,10 @@ class ShownByViews : public Renderer {
         RasterSettings raster;
         raster.materials = materials_;
         STX_TRY(auto image, rasterise(mesh_, camera, raster, job_));
+        image.code();
+        // Views clip what is brighter than white before anything is behind it.
+        if (mesh_.splats)
+            for (auto& c : image.colour.pixels()) c = glm::vec4(glm::min(glm::vec3(c), c.w), c.w);
         const Texture texture(std::move(image.colour));
         const auto solid = translucentSurfaces(texture, image.depth);
         Frame frame;

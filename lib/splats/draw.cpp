@@ -239,13 +239,10 @@ glm::vec3 normalOf(const SplatCloud& cloud, std::size_t i, const Camera& camera)
 }
 
 /// What the splats of a pixel came to, as SplatPicture::colour has it.
-glm::vec4 pixelColour(glm::vec3 sum, float alpha, bool linear) {
+glm::vec4 pixelColour(glm::vec3 sum, float alpha) {
     if (!(alpha > 0.0f)) return glm::vec4(0.0f);
     // Harmonics of a damaged file can lead beyond all floats.
-    glm::vec3 straight = glm::min(sum / alpha, kLargestHalf);
-    if (linear)
-        for (int k = 0; k < 3; ++k) straight[k] = srgbFromLinear(straight[k]);
-    return {straight * alpha, alpha};
+    return {glm::min(sum / alpha, kLargestHalf) * alpha, alpha};
 }
 
 }  // namespace
@@ -316,7 +313,7 @@ Result<SplatPicture> drawSplats(const SplatCloud& cloud, const Camera& camera, b
             for (int x = left; x < std::min(left + kTile, width); ++x) {
                 const auto p = static_cast<std::size_t>((y - top) * kTile + x - left);
                 out.colour.at(x, y) = pixelColour({pixels.red[p], pixels.green[p], pixels.blue[p]},
-                                                  1.0f - pixels.transmittance[p], cloud.linear);
+                                                  1.0f - pixels.transmittance[p]);
                 if (pixels.median[p] < 0) continue;
                 const std::size_t splat = seen[pixels.median[p]].number;
                 const double depth = depthIn(cloud, splat, eye, x + 0.5, y + 0.5);

@@ -11,7 +11,9 @@ namespace stx {
 
 /// A cloud of splats seen by a camera.
 struct SplatPicture {
-    /// sRGB-coded, premultiplied by what the splats cover (alpha); beyond 1 where harmonics lead.
+    /// In the cloud's own space (sRGB-coded, or linear light where SplatCloud::linear), in which
+    /// what is behind is to be added, premultiplied by what the splats cover (alpha); beyond 1
+    /// where harmonics lead.
     Image<glm::vec4> colour;
     /// Planar distance, kNoDepth where the splats let half of what is behind them through: that of
     /// the splat at which the transmittance falls below one half, where the pixel's ray comes

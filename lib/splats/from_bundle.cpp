@@ -1,6 +1,7 @@
 #include "lib/splats/from_bundle.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -126,12 +127,15 @@ Result<std::unique_ptr<ViewTable>> withAxes(std::unique_ptr<ViewTable> table) {
 Result<std::vector<Image<Disc>>> finestDiscs(const ViewTable& table, const SplatSettings& settings,
                                              PixelSpool* spool, Job& job) {
     std::vector<Image<Disc>> images(table.count());
+    std::atomic<bool> beyondWhite = false;
     STX_CHECK(forEachView(table, {peak::kSplats.what, sizeof(Disc)}, job,
                           [&](std::size_t i, auto view) -> Result<void> {
                               images[i] = discsOf(*view);
+                              if (isBeyondWhite(view->texture)) beyondWhite = true;
                               images[i].moveTo(spool);
                               return {};
                           }));
+    if (beyondWhite) job.noteOnce("linear colour becomes sRGB; values above 1 are clipped");
     splats::keepFinest(std::as_const(table).about(), images, spool);
     parallelFor(0, images.size(), [&](std::size_t i) {
         if (spool) spool->settle();

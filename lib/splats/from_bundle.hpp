@@ -23,9 +23,10 @@ struct SplatSettings {
 
 /// A Gaussian for each place that views show, of the view that shows it finest: below its point
 /// (see SplatSettings::pixelsPerTexel), flat in its surface, along the axes of its ellipse (those
-/// of bake() where a view has none), with its colour and 0.99 of its alpha. Splats of background
-/// views come first. The coordinates are the world's: an origin is added, with a note where floats
-/// round it. What is up in the cloud is that of the views' cameras (upOfCameras()).
+/// of bake() where a view has none), with its colour, white where it is brighter (a note says so),
+/// and 0.99 of its alpha. Splats of background views come first. The coordinates are the world's:
+/// an origin is added, with a note where floats round it. What is up in the cloud is that of the
+/// views' cameras (upOfCameras()).
 ///
 /// Views are read one by one. What is known of each pixel is in a spool, if any: then memory is
 /// taken for one view for each thread, and for the cloud.

@@ -138,6 +138,9 @@ Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job) {
             cloud.setHarmonic(i, k % coefficients, k / coefficients,
                               static_cast<float>(splat[atRest[k]]));
     }
+    if (&vertices == &header.elements.back() && values.beginElement())
+        job.note(fmt::format("the header says {} splats: what follows them is ignored ({} bytes)",
+                             count, bytes.size() - values.offset()));
     noteDropped(header, job);
     return meshOfSplats(std::move(splats), job);
 }

@@ -9,7 +9,7 @@ namespace stx {
 /// A rendered picture. All images have the same size; row 0 is on top.
 struct Frame {
     /// Premultiplied RGBA in the bundle's own colour space (sRGB-coded 0..1, or linear), lit;
-    /// beyond 1 where Lighting::beyondOne lets it.
+    /// beyond 1 where Lighting::beyondOne lets it, and where splats are brighter than white.
     Image<glm::vec4> colour;
     bool linear = false;      ///< colour is linear light, not sRGB-coded
     Image<glm::vec4> albedo;  ///< as colour, before lighting; empty when not asked for

@@ -30,6 +30,7 @@ Result<Frame> MeshRenderer::render(const Camera& camera) {
     STX_TRY(auto image, rasterise(mesh_, camera, raster, job_));
     Frame frame;
     frame.colour = std::move(image.colour);
+    frame.linear = image.linear;
     frame.depth = std::move(image.depth);
     frame.normal = std::move(image.normal);
     if (settings_.wantNormals()) frame.albedo = frame.colour;

@@ -1,6 +1,8 @@
 // Views as pictures with depth for programs that take one photograph.
 #include "formats/imagesets/export_picture.hpp"
 
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 #include "formats/images/images.hpp"
@@ -60,6 +62,25 @@ TEST(DepthPictures, ArePairsOfOneSize) {
     const auto grey = decodeRgba8(*depth, "v", Limits());
     ASSERT_TRUE(grey);
     EXPECT_EQ(grey->at(1, 0).r, 51);
+}
+
+TEST(DepthPictures, SayThatColoursBeyondWhiteAreClipped) {
+    const TemporaryFolder folder;
+    for (const float bright : {1.0f, 4.0f}) {
+        ReferenceView linear = view();
+        RgbaFloatImage colour(4, 1, glm::vec4(0.5f, 0.5f, 0.5f, 1.0f));
+        colour.at(1, 0).g = bright;
+        // What nobody sees does not count.
+        colour.at(3, 0) = glm::vec4(9.0f, 9.0f, 9.0f, 0.0f);
+        linear.texture = Texture(std::move(colour));
+        Job job;
+        ASSERT_TRUE(
+            exportPicture(linear, folder / "v_rgbd.png", DepthPicture::sideBySide, 92, {}, job));
+        const auto notes = job.takeNotes();
+        EXPECT_EQ(std::ranges::count(
+                      notes, "linear colour becomes 8-bit sRGB; values above 1 are clipped"),
+                  bright > 1 ? 1 : 0);
+    }
 }
 
 TEST(DepthPictures, AreOfViewsWithDepth) {

@@ -343,6 +343,37 @@ TEST(Ply, WhatIsDroppedIsSaid) {
     EXPECT_NEAR(splats.mesh.colours[0].b, 0.0f, 1e-4f);
 }
 
+TEST(Ply, ColoursOf16BitsThatAreBytesAreTakenForThem) {
+    const auto greyOf = [](const std::string& values) {
+        return readGoodText(plyOf("property ushort red\nproperty ushort green\nproperty ushort "
+                                  "blue\nproperty ushort alpha\n",
+                                  values),
+                            "a.ply");
+    };
+    const auto bytes = greyOf("0 128 255 255");
+    ASSERT_EQ(bytes.mesh.colours.size(), 2u);
+    EXPECT_NEAR(bytes.mesh.colours[0].g, linearFromSrgb(128 / 255.0f), 1e-4f);
+    EXPECT_NEAR(bytes.mesh.colours[0].b, 1.0f, 1e-4f);
+    // Their alpha is full.
+    EXPECT_EQ(bytes.notes, std::vector<std::string>{
+                               "the 16-bit colours of the PLY file reach 255 of 65535 only: they "
+                               "are taken for 8 bits, 0 to 255"});
+    const auto deep = greyOf("0 128 32768 65535");
+    ASSERT_EQ(deep.mesh.colours.size(), 2u);
+    EXPECT_NEAR(deep.mesh.colours[0].g, linearFromSrgb(128 / 65535.0f), 1e-5f);
+    EXPECT_NEAR(deep.mesh.colours[0].b, linearFromSrgb(32768 / 65535.0f), 1e-4f);
+    EXPECT_TRUE(deep.notes.empty()) << deep.notes[0];
+    const auto faces = readGoodText(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+        "float z\nelement face 1\nproperty list uchar int vertex_indices\nproperty ushort red\n"
+        "property ushort green\nproperty ushort blue\nend_header\n"
+        "0 0 0\n1 0 0\n1 1 0\n3 0 1 2 0 200 100\n",
+        "a.ply");
+    ASSERT_FALSE(faces.mesh.colours.empty());
+    EXPECT_NEAR(faces.mesh.colours[0].g, linearFromSrgb(200 / 255.0f), 1e-4f);
+    EXPECT_TRUE(faces.hasNote("reach 200 of 65535 only"));
+}
+
 // Two faces of a roof share two vertices, whose normals are no directions.
 TEST(BrokenNormals, OfVerticesThatFacesShareAreThoseOfEachFace) {
     const float h = std::sqrt(0.5f);

@@ -396,9 +396,26 @@ TEST(Splats, HostilePlyIsAnErrorOrLeftOut) {
     const float infinite = INFINITY, e80 = 80.0f;
     std::memcpy(broken.data() + broken.size() - 4 * 34, &infinite, 4);
     const ReadModel model = readGoodText(broken, "a.ply");
-    EXPECT_TRUE(model.hasNote("1 of 2 splats left out"));
+    EXPECT_TRUE(
+        model.hasNote("1 of 2 splats left out: a value is not finite, a size is below 0 or "
+                      "above 1e+15, an opacity is below 0 or a rotation has no length"));
     std::memcpy(broken.data() + broken.size() - 4 * 7, &e80, 4);
     EXPECT_NE(readBadText(broken, "a.ply").message.find("none of the 2 splats"), std::string::npos);
+    EXPECT_EQ(readBadText(splatPly("", 0, 0), "a.ply").message,
+              "there are no splats; at least one is expected");
+}
+
+TEST(Splats, WhatFollowsThoseThatThePlyHeaderCountsIsSaid) {
+    // One splat more than it says, and two letters.
+    const ReadModel more = readGoodText(splatPly("", 2, 3 * 17) + "ab", "a.ply");
+    ASSERT_TRUE(more.mesh.splats);
+    EXPECT_EQ(more.mesh.splats->positions.size(), 2u);
+    EXPECT_TRUE(more.hasNote("the header says 2 splats: what follows them is ignored (70 bytes)"));
+    EXPECT_FALSE(readGoodText(splatPly("", 2, 2 * 17), "a.ply").hasNote("follows"));
+    std::string text = asText(written(randomCloud(5, 0, 4), "a.ply"));
+    EXPECT_FALSE(readGoodText(text + "\n\n", "a.ply").hasNote("follows"));
+    text.replace(text.find("vertex 5"), 8, "vertex 4");
+    EXPECT_TRUE(readGoodText(text, "a.ply").hasNote("the header says 4 splats: what follows"));
 }
 
 TEST(Splats, APlyWithoutTheirPropertiesIsAPointCloud) {

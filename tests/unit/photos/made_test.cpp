@@ -129,6 +129,64 @@ TEST(MadePhotos, GDepthTakesTheSharpOriginal) {
     EXPECT_FALSE(isSharp(*blurred));
 }
 
+TEST(MadePhotos, GDepthMayHaveBase64InLines) {
+    for (const char* lineEnd : {"\n", "\r\n\t ", " "}) {
+        const auto photo = open(made::gdepthPhoto(made::colourJpeg(32, 24, 255), "RangeInverse",
+                                                  made::depthPng(), made::colourJpeg(),
+                                                  "D:Near=\"1\" D:Far=\"9\"", 400, {}, lineEnd));
+        ASSERT_TRUE(photo) << photo.error().text();
+        EXPECT_NEAR(distancesOf(*photo).at(0, 0), 1, 1e-4);
+        EXPECT_TRUE(isSharp(*photo));
+    }
+}
+
+TEST(MadePhotos, GDepthMayNameItsMd5InSmallLetters) {
+    // In both places, or in the packet alone.
+    for (const bool both : {true, false}) {
+        Bytes file = made::gdepthPhoto();
+        const auto text = [&] {
+            return std::string_view(reinterpret_cast<const char*>(file.data()), file.size());
+        };
+        constexpr std::string_view kBefore = "HasExtendedXMP=\"";
+        const auto at = text().find(kBefore);
+        ASSERT_NE(at, std::string_view::npos);
+        const std::string guid(text().substr(at + kBefore.size(), 32));
+        const auto firstPart = text().find("http://ns.adobe.com/xmp/extension/");
+        bool changed = false;
+        for (std::size_t found = text().find(guid); found != std::string_view::npos;
+             found = text().find(guid, found + 1)) {
+            if (!both && found > firstPart) break;
+            for (std::size_t i = found; i < found + guid.size(); ++i) {
+                const char c = static_cast<char>(file[i]);
+                if (c < 'A' || c > 'F') continue;
+                file[i] = static_cast<std::byte>(c - 'A' + 'a');
+                changed = true;
+            }
+        }
+        EXPECT_TRUE(changed);
+        const auto photo = open(std::move(file));
+        ASSERT_TRUE(photo) << photo.error().text();
+        EXPECT_NEAR(distancesOf(*photo).at(0, 0), 1, 1e-4);
+    }
+}
+
+TEST(MadePhotos, GDepthSaysWhichEndOfItsRangeIsNoNumber) {
+    const auto errorOf = [](const std::string& attributes) {
+        const auto photo = open(made::gdepthPhoto(made::colourJpeg(), "RangeInverse",
+                                                  made::depthPng(), {}, attributes, 400));
+        EXPECT_FALSE(photo);
+        return photo ? std::string() : photo.error().message;
+    };
+    EXPECT_EQ(errorOf("D:Near=\"0,5\" D:Far=\"8\""),
+              "the GDepth:Near of its depth is '0,5'; a finite number like 0.5 is expected");
+    EXPECT_EQ(errorOf("D:Near=\"0.5\" D:Far=\"inf\""),
+              "the GDepth:Far of its depth is 'inf'; a finite number like 0.5 is expected");
+    EXPECT_EQ(errorOf("D:Near=\"0.5\""),
+              "it has depth, but not its GDepth:Far; a finite number is expected");
+    EXPECT_EQ(errorOf("D:Near=\"0\" D:Far=\"8\""),
+              "its depth is from 0 to 8; the first must be above 0 and below the second");
+}
+
 TEST(MadePhotos, GDepthOfRaysIsAlongThem) {
     const auto photo = open(made::gdepthPhoto(400, "RangeLinear", "D:MeasureType=\"OpticRay\""));
     ASSERT_TRUE(photo) << photo.error().text();

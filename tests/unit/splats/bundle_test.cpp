@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
@@ -63,6 +64,22 @@ TEST(SplatsOfBundle, LieFlatInTheSurface) {
     }
     // Corners without a neighbour to both sides face their camera.
     EXPECT_LE(tilted, 8);
+}
+
+TEST(SplatsOfBundle, SayThatColoursBeyondWhiteAreClipped) {
+    for (const float bright : {1.0f, 4.0f}) {
+        Bundle bundle = squareBundle();
+        const glm::ivec2 size = bundle.views[0].depth.size();
+        RgbaFloatImage colour(size.x, size.y, glm::vec4(0.5f, 0.5f, 0.5f, 1.0f));
+        colour.at(size.x / 2, size.y / 2).g = bright;
+        bundle.views.resize(1);
+        bundle.views[0].texture = Texture(std::move(colour));
+        Job job;
+        ASSERT_TRUE(splatsOfViews(*viewsOf(bundle), {}, nullptr, job));
+        EXPECT_EQ(std::ranges::count(job.takeNotes(),
+                                     "linear colour becomes sRGB; values above 1 are clipped"),
+                  bright > 1 ? 1 : 0);
+    }
 }
 
 TEST(SplatsOfBundle, EachPlaceIsOfTheViewThatShowsItFinest) {

@@ -10,6 +10,8 @@
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/depth_code.hpp"
 #include "lib/model/texture.hpp"
+#include "lib/render/api/frame_picture.hpp"
+#include "lib/render/mesh/mesh_renderer.hpp"
 #include "lib/splats/draw.hpp"
 #include "tests/every_target.hpp"
 #include "tests/unit/splats/random_cloud.hpp"
@@ -256,23 +258,56 @@ TEST(DrawSplats, LinearColoursAreBlendedAsLight) {
     Job job;
     const auto drawn = drawSplats(cloud, cameraFrom({0, 0, 3}, 21, 21), false, job);
     const glm::vec4 middle = drawn->colour.at(10, 10);
-    EXPECT_NEAR(middle.x / middle.w, srgbFromLinear(0.2f), 1e-4f);
+    EXPECT_NEAR(middle.x / middle.w, 0.2f, 1e-4f);
 }
 
-TEST(DrawSplats, BrighterThanWhiteIsClippedOnlyWhereThePictureCannotHoldIt) {
+TEST(DrawSplats, WhatIsBehindLinearColoursIsAddedAsLight) {
     Mesh mesh;
     auto cloud = disc({0, 0, 1});
+    cloud.linear = true;
+    cloud.opacities[0] = 0.8f;
+    cloud.colours[0] = glm::vec3(0.2f);
+    mesh.splats = std::make_shared<const SplatCloud>(cloud);
+    mesh.positions = {{0, 0, 0}};
+    mesh.points = {0};
+    Job job;
+    const Camera camera = cameraFrom({0, 0, 3}, 21, 21);
+    const auto frame = makeMeshRenderer(mesh, {}, job)->render(camera);
+    ASSERT_TRUE(frame);
+    EXPECT_TRUE(frame->linear);
+    const float alpha = frame->colour.at(10, 10).w;
+    EXPECT_NEAR(rgba8From(*frame, glm::vec3(1.0f)).at(10, 10).r,
+                255 * srgbFromLinear(0.2f * alpha + 1.0f - alpha), 1);
+    // Views hold codes.
+    const auto view = captureView(mesh, camera, "v", {}, job);
+    ASSERT_TRUE(view) << view.error().text();
+    EXPECT_FALSE(view->texture.isLinear());
+    EXPECT_NEAR(view->texture.at(10, 10).x, srgbFromLinear(0.2f), 1.0 / 255);
+}
+
+TEST(DrawSplats, BrighterThanWhiteIsClippedBehindTheBackground) {
+    Mesh mesh;
+    auto cloud = disc({0, 0, 1});
+    cloud.opacities[0] = 0.5f;
     cloud.colours[0] = glm::vec3(1.5f, 0.5f, 0);
     mesh.splats = std::make_shared<const SplatCloud>(cloud);
     for (const bool beyondOne : {true, false}) {
         RasterSettings settings;
         settings.lighting.beyondOne = beyondOne;
         Job job;
-        const auto image = rasterise(mesh, cameraFrom({0, 0, 3}, 21, 21), settings, job);
+        auto image = rasterise(mesh, cameraFrom({0, 0, 3}, 21, 21), settings, job);
         ASSERT_TRUE(image);
         const glm::vec4 middle = image->colour.at(10, 10);
-        EXPECT_NEAR(middle.x / middle.w, beyondOne ? 1.5f : 1.0f, 1e-5f);
+        EXPECT_NEAR(middle.x / middle.w, 1.5f, 1e-5f);
         EXPECT_NEAR(middle.y / middle.w, 0.5f, 1e-5f);
+        Frame frame;
+        frame.colour = std::move(image->colour);
+        // Red is 0.75 and 0.25 times what is behind it, and green 0.25 and 0.5 times that.
+        const glm::u8vec4 onBlack = rgba8From(frame, glm::vec3(0.0f)).at(10, 10);
+        EXPECT_NEAR(onBlack.r, 0.75 * 255, 2);
+        const glm::u8vec4 onWhite = rgba8From(frame, glm::vec3(1.0f)).at(10, 10);
+        EXPECT_EQ(onWhite.r, 255);
+        EXPECT_NEAR(onWhite.g, 0.75 * 255, 2);
     }
 }
 
