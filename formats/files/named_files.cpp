@@ -32,7 +32,7 @@ std::optional<FileNumber> numberOf(const std::filesystem::path& file) {
     return FileNumber(status.st_dev, status.st_ino);
 }
 
-void remember(const std::filesystem::path& file, std::set<FileNumber> NamedFiles::*among) {
+void rememberAmong(const std::filesystem::path& file, std::set<FileNumber> NamedFiles::*among) {
     NamedFiles& all = namedFiles();
     if (!all.guarded) return;
     const auto number = numberOf(file);
@@ -48,11 +48,11 @@ void guardNamedFiles() {
 }
 
 void rememberInput(const std::filesystem::path& file) {
-    remember(file, &NamedFiles::inputs);
+    rememberAmong(file, &NamedFiles::inputs);
 }
 
 void rememberNamedFile(const std::filesystem::path& file) {
-    remember(file, &NamedFiles::numbers);
+    rememberAmong(file, &NamedFiles::numbers);
 }
 
 FilesOfFilm::FilesOfFilm(const std::vector<std::filesystem::path>& files) {
