@@ -127,7 +127,8 @@ void bindFrame(py::module_& module) {
         .def_property_readonly(
             "colour", image(&Frame::colour),
             "(height, width, 4) float32, premultiplied by alpha, lit: sRGB-coded 0..1 (above it "
-            "where beyond_one lets it), or linear light where `linear`.")
+            "where beyond_one lets it or splats are brighter than white), or linear light where "
+            "`linear`.")
         .def_property_readonly(
             "alpha",
             [image](const DrawnFrame& d) {
