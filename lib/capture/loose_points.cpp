@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -69,77 +68,6 @@ class PointGrid {
     std::vector<Placed> points_;  ///< sorted by their cells
 };
 
-/// A disc's radius for the distance of its point to a neighbour: half as far again as the middle of
-/// a square of four points, which is sqrt(1/2) of its side away.
-constexpr double kClosing = std::numbers::sqrt2 * 0.75;
-
-/// The bits of a number of 21 bits, two zeros between each two.
-std::uint64_t spreadBits(std::uint64_t x) {
-    x = (x | x << 32) & 0x001f00000000ffff;
-    x = (x | x << 16) & 0x001f0000ff0000ff;
-    x = (x | x << 8) & 0x100f00f00f00f00f;
-    x = (x | x << 4) & 0x10c30c30c30c30c3;
-    return (x | x << 2) & 0x1249249249249249;
-}
-
-/// A radius for each point, by its vertex: `most`, and less where its neighbours are so near that
-/// less closes the gaps to them. A dense part of a cloud would be drawn with the discs of its
-/// sparsest part otherwise. Neighbours are looked for among those beside it along a Z curve, which
-/// may miss some: then the radius is larger.
-std::vector<float> radiiOfPoints(const Mesh& mesh, float most) {
-    // A square of points has eight around each. With four, a plane whose half was recorded five
-    // times, a little apart, has 17 % more holes, with eight 2 %; points spread at random keep
-    // their discs.
-    constexpr std::size_t kNeighbours = 8;
-    // To each side. With twice as many discs are hardly smaller, with half as many a tenth of them
-    // is 1.8 times as large in a grid.
-    constexpr std::int64_t kBeside = 16;
-    struct Placed {
-        std::uint64_t onCurve;
-        std::uint32_t point;
-    };
-    Bounds bounds;
-    for (const auto p : mesh.points) bounds.add(glm::dvec3(mesh.positions[p]));
-    const glm::dvec3 extent = bounds.max - bounds.min;
-    const double size = std::max({extent.x, extent.y, extent.z});
-    std::vector<float> radii(mesh.positions.size(), most);
-    if (!(size > 0)) return radii;
-    std::vector<Placed> order;
-    order.reserve(mesh.points.size());
-    constexpr double kSteps = (1 << 21) - 1;
-    for (const auto p : mesh.points) {
-        const glm::dvec3 at = (glm::dvec3(mesh.positions[p]) - bounds.min) / size * kSteps;
-        order.push_back({spreadBits(static_cast<std::uint64_t>(at.x)) |
-                             spreadBits(static_cast<std::uint64_t>(at.y)) << 1 |
-                             spreadBits(static_cast<std::uint64_t>(at.z)) << 2,
-                         p});
-    }
-    std::ranges::sort(order, [](const Placed& a, const Placed& b) {
-        return std::pair(a.onCurve, a.point) < std::pair(b.onCurve, b.point);
-    });
-    const auto count = static_cast<std::int64_t>(order.size());
-    std::vector<float> own(order.size(), most);
-    parallelFor(0, count, 4096, [&](std::int64_t i) {
-        const glm::dvec3 centre(mesh.positions[order[static_cast<std::size_t>(i)].point]);
-        std::array<double, kNeighbours> nearest;  // squares, the nearest first
-        nearest.fill(std::numeric_limits<double>::infinity());
-        for (std::int64_t j = std::max<std::int64_t>(0, i - kBeside);
-             j < std::min(count, i + kBeside + 1); ++j) {
-            const glm::dvec3 d =
-                glm::dvec3(mesh.positions[order[static_cast<std::size_t>(j)].point]) - centre;
-            const double square = glm::dot(d, d);
-            if (!(square > 0) || square >= nearest.back()) continue;
-            const auto at = std::ranges::upper_bound(nearest, square);
-            std::move_backward(at, nearest.end() - 1, nearest.end());
-            *at = square;
-        }
-        const double radius = kClosing * std::sqrt(nearest.back());
-        if (radius < most) own[static_cast<std::size_t>(i)] = static_cast<float>(radius);
-    });
-    for (std::size_t i = 0; i < order.size(); ++i) radii[order[i].point] = own[i];
-    return radii;
-}
-
 /// Sampled points or triangles say enough of how dense all are.
 constexpr std::size_t kDensitySamples = 4096;
 
@@ -187,7 +115,7 @@ LoosePoints loosePoints(const Mesh& mesh) {
     const auto at = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 9 / 10);
     std::nth_element(distances.begin(), at, distances.end());
     // A handful of points does not make a surface: they stay dots.
-    const double closing = *at * kClosing;
+    const double closing = *at * std::numbers::sqrt2 * 0.75;
     return {static_cast<float>(std::min(closing, most)), closing > most};
 }
 
@@ -198,11 +126,8 @@ constexpr std::uint64_t kPartOfMemory = 4;
 
 /// What points become: rings of corners around the axis towards the camera, and the pole of a ball.
 struct Shape {
-    Shape(const Mesh& mesh, const LoosePoints& points)
-        : radii(points.apart ? std::vector<float>(mesh.positions.size(), points.radius)
-                             : radiiOfPoints(mesh, points.radius)),
-          around(points.apart ? 12 : 6),
-          pole(points.apart) {
+    explicit Shape(const LoosePoints& points)
+        : radius(points.radius), around(points.apart ? 12 : 6), pole(points.apart) {
         constexpr double kRight = std::numbers::pi / 2;
         rings = {kRight};
         if (pole) rings.insert(rings.end(), {kRight * 2 / 3, kRight / 3});
@@ -212,7 +137,7 @@ struct Shape {
         return around * 2 * (rings.size() - 1) + (pole ? around : around - 2);
     }
 
-    std::vector<float> radii;   ///< of points, by their vertices
+    float radius;
     std::uint32_t around;       ///< corners of a ring
     std::vector<double> rings;  ///< by their angle from the axis
     bool pole;
@@ -287,7 +212,7 @@ void addPoints(const Mesh& mesh, std::span<const std::uint32_t> points, const Ca
         const glm::vec3 u = glm::normalize(glm::cross(other, *axis)), v = glm::cross(*axis, u);
         const auto first = static_cast<std::uint32_t>(out.positions.size());
         const auto add = [&](glm::vec3 direction) {
-            out.positions.push_back(centre + direction * shape.radii[p]);
+            out.positions.push_back(centre + direction * shape.radius);
             forEachArray(mesh, out, [&](const auto& values, auto& to) { to.push_back(values[p]); });
         };
         for (const double angle : shape.rings)
@@ -369,7 +294,7 @@ Result<std::vector<std::uint32_t>> pointsToDraw(const Mesh& mesh, const Camera& 
 
 Result<Mesh> pointsAsTriangles(const Mesh& mesh, const Camera& camera,
                                const RasterSettings& settings, Job& job) {
-    const Shape shape(mesh, loosePoints(mesh));
+    const Shape shape(loosePoints(mesh));
     STX_TRY(const auto points, pointsToDraw(mesh, camera, settings, shape, job));
     Mesh out = withoutPoints(mesh);
     addPoints(mesh, points, camera, shape, out);

@@ -49,8 +49,7 @@ struct RasterImage {
 
 /// How the loose points of a mesh are drawn.
 struct LoosePoints {
-    /// Closes the gaps between them, scene units; 0 when the mesh has none. Discs of points whose
-    /// neighbours are nearer are smaller.
+    /// Closes the gaps between them, scene units; 0 when the mesh has none.
     float radius = 0;
     /// They are too few for that, and stay dots, drawn as balls, which look alike from everywhere.
     /// Discs face their camera, so that each view has other ones: surface mode lost their rims, two

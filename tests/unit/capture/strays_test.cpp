@@ -1,7 +1,5 @@
 #include "lib/model/strays.hpp"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
 
 #include "lib/capture/capture.hpp"
@@ -51,49 +49,6 @@ TEST(Points, FewBesideFineTrianglesAreAsSmallAsThese) {
     EXPECT_NEAR(loosePoints(mesh).radius, kStep, 1e-4);
     mesh.triangles.clear();
     EXPECT_GT(loosePoints(mesh).radius, 1.2f * kStep) << "alone they are larger";
-}
-
-// Two scans of different density: the sparse one decides how large discs are at most.
-TEST(Points, DenseOnesBesideSparseOnesHaveSmallDiscs) {
-    constexpr float kHoleX = 0.32f, kHole = 0.1f;
-    Mesh mesh;
-    for (int y = 0; y < 40; ++y)
-        for (int x = 0; x < 40; ++x)
-            addPoint(mesh, {-2.0f + 0.05f * static_cast<float>(x),
-                            -1.0f + 0.05f * static_cast<float>(y), 0});
-    for (int y = 0; y < 60; ++y)
-        for (int x = 0; x < 60; ++x) {
-            const glm::vec3 at(0.02f + 0.01f * static_cast<float>(x),
-                               -0.3f + 0.01f * static_cast<float>(y), 0);
-            if (glm::length(at - glm::vec3(kHoleX, 0, 0)) >= kHole) addPoint(mesh, at);
-        }
-    mesh.materials.emplace_back();
-    constexpr double kAway = 3;
-    const glm::dvec3 eye(kHoleX, 0, kAway);
-    const Camera camera =
-        Camera::fromFieldOfView(eye, *lookAt(eye, {kHoleX, 0, 0}), {0.8, 0.8}, false, 400, 400);
-    Job job;
-    const auto image = rasterise(mesh, camera, {}, job);
-    ASSERT_TRUE(image) << image.error().text();
-    int around = 0, covered = 0;
-    for (int y = 0; y < 400; ++y)
-        for (int x = 0; x < 400; ++x) {
-            const double u = (x + 0.5 - camera.cx) / camera.fx * kAway,
-                         v = (y + 0.5 - camera.cy) / camera.fy * kAway, fromHole = std::hypot(u, v);
-            const bool shown = hasPoint(image->depth.at(x, y));
-            // No gap in either part.
-            const bool dense = std::abs(u) < 0.25 && std::abs(v) < 0.25 && fromHole > 0.115,
-                       sparse = u > -1.1 && u < -0.42 && std::abs(v) < 0.8;
-            if (dense || sparse) {
-                EXPECT_TRUE(shown) << x << ' ' << y;
-            }
-            if (std::abs(fromHole - 0.05) > 0.005) continue;
-            ++around;
-            covered += shown ? 1 : 0;
-        }
-    // With one size for all 86 % of what is half way into the hole is covered.
-    EXPECT_GT(around, 20);
-    EXPECT_LT(covered, 0.3 * around);
 }
 
 // Views of discs, each of which faces its camera, would contradict each other.
