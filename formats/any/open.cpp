@@ -9,6 +9,7 @@
 #include "formats/files/not_there.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/imagesets/image_sets.hpp"
+#include "formats/imagesets/recognise.hpp"
 #include "formats/imagesets/set_views.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/mpeg4/mpeg4.hpp"

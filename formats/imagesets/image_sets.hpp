@@ -115,12 +115,6 @@ struct ImageSetKind {
 /// io when there is nothing, invalidInput when it is not an image set, with what was looked for.
 [[nodiscard]] Result<std::string> recogniseImageSet(const std::filesystem::path& path);
 
-namespace imagesets {
-/// The depth picture that lies beside NAME_image.jpg or NAME.jpg, any picture: NAME_depth with the
-/// ending of a picture. Empty: none does.
-[[nodiscard]] std::filesystem::path depthBeside(const std::filesystem::path& picture);
-}  // namespace imagesets
-
 /// Reads one frame of a set; of a set that moves frame 0, with a note, when none is asked for.
 /// Cameras are exact; lens distortion and skew are undone (views have the pixels of a pinhole that
 /// the picture shows all of) and rotations repaired, with a note of their size in pixels. Pixels

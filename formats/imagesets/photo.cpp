@@ -14,6 +14,7 @@
 #include "formats/images/images.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/pictures.hpp"
+#include "formats/imagesets/recognise.hpp"
 #include "formats/imagesets/set_options.hpp"
 #include "formats/imagesets/two_cameras.hpp"
 #include "formats/photos/photo.hpp"
