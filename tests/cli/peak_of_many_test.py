@@ -58,7 +58,7 @@ def many_views(args, folder):
     model, wrong, counts = os.path.abspath(args.model), [], MODEL
 
     def views(count):
-        return ["--views", f"sphere:{count}", "--size", "384x384"]
+        return ["--views", f"sphere:{count}", "--size", "512x512"]
 
     for count in counts:
         must([args.stx, "convert", model, "-o", f"many{count}.exr"] + views(count), folder)
