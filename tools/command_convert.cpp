@@ -463,8 +463,7 @@ void addSetFiles(Command& c, const std::shared_ptr<ConvertOptions>& o) {
         "What pixels without depth are: empty (nothing is there: seen past) or unknown (a "
         "surface that the sensor missed). auto: as the depth says (infinity or 1e9 and more is "
         "empty), else empty where a picture has transparent pixels or a mask and all that is "
-        "opaque "
-        "has depth, and unknown where not");
+        "opaque has depth, and unknown where not");
     c.option(
          "--yuv",
          [o](const std::string& text) -> Result<void> {

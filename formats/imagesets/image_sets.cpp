@@ -272,7 +272,8 @@ class SetSequence : public Sequence {
         } else if (set_.frames > 1) {
             const int count = (set_.frames + options_.every - 1) / options_.every;
             timeline_ = steadyTimeline(count, set_.rate / options_.every);
-            // Of a film whose length is no multiple of N the last frame is shown for less than N.
+            // Of a film whose length is not a multiple of N the last frame is shown for less than
+            // N.
             if (timeline_.moves()) {
                 timeline_.end = set_.frames / set_.rate;
                 timeline_.findTick();

@@ -51,25 +51,41 @@ bool Lens::isShown(const Camera& c, glm::dvec2 pixel) const {
 
 PixelRectangle Lens::shownPart(const Camera& c) const {
     PixelRectangle r{0, 0, c.width, c.height};
-    const auto missing = [&](int x, int y, glm::ivec2 step, int count) {
-        int outside = 0;
-        for (int i = 0; i < count; ++i)
-            outside += isShown(c, {x + i * step.x + 0.5, y + i * step.y + 0.5}) ? 0 : 1;
-        return static_cast<double>(outside) / count;
+    // Pixels of each side that the picture does not show. A step changes all of one side, and the
+    // ends of two others.
+    const auto isMissing = [&](int x, int y) { return isShown(c, {x + 0.5, y + 0.5}) ? 0 : 1; };
+    const auto inColumn = [&](int x) {
+        int count = 0;
+        for (int y = r.y; y < r.y + r.height; ++y) count += isMissing(x, y);
+        return count;
     };
+    const auto inRow = [&](int y) {
+        int count = 0;
+        for (int x = r.x; x < r.x + r.width; ++x) count += isMissing(x, y);
+        return count;
+    };
+    int left = inColumn(r.x), right = inColumn(r.x + r.width - 1);
+    int top = inRow(r.y), bottom = inRow(r.y + r.height - 1);
     while (r.width > 0 && r.height > 0) {
-        const double left = missing(r.x, r.y, {0, 1}, r.height);
-        const double right = missing(r.x + r.width - 1, r.y, {0, 1}, r.height);
-        const double top = missing(r.x, r.y, {1, 0}, r.width);
-        const double bottom = missing(r.x, r.y + r.height - 1, {1, 0}, r.width);
-        const double most = std::max({left, right, top, bottom});
-        if (most == 0) break;
-        if (left == most || right == most) {
-            r.x += left == most ? 1 : 0;
+        const double wide = std::max(left, right) / static_cast<double>(r.height);
+        const double high = std::max(top, bottom) / static_cast<double>(r.width);
+        if (wide == 0 && high == 0) break;
+        if (wide >= high) {
+            const bool first = left >= right;
+            const int x = first ? r.x : r.x + r.width - 1;
+            top -= isMissing(x, r.y);
+            bottom -= isMissing(x, r.y + r.height - 1);
+            r.x += first ? 1 : 0;
             --r.width;
+            (first ? left : right) = inColumn(first ? r.x : r.x + r.width - 1);
         } else {
-            r.y += top == most ? 1 : 0;
+            const bool first = top >= bottom;
+            const int y = first ? r.y : r.y + r.height - 1;
+            left -= isMissing(r.x, y);
+            right -= isMissing(r.x + r.width - 1, y);
+            r.y += first ? 1 : 0;
             --r.height;
+            (first ? top : bottom) = inRow(first ? r.y : r.y + r.height - 1);
         }
     }
     if (r.width <= 0 || r.height <= 0) return {};

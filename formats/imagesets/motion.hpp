@@ -23,7 +23,7 @@ struct Motion {
     double end = 0;             ///< when the last picture ends
 
     /// How many cameras there are where only poses say so and some took one picture only, so that
-    /// they may be one that moves; 0: there is no doubt.
+    /// they may be one that moves; 0 where all is clear.
     std::size_t doubtfulCameras = 0;
 
     [[nodiscard]] bool moves() const { return times.size() > 1; }

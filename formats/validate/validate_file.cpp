@@ -25,8 +25,8 @@ Result<std::vector<Finding>> ofUnreadSet(Error error) {
     return unreadable(error);
 }
 
-/// Takes away what is no fault of a frame where other frames of the film do without it: a view, or
-/// all of them, without a point (rules 4006 and 4007). `files`: the findings of each.
+/// Takes away what is not a fault of a frame where other frames of the film do without it: a view,
+/// or all of them, without a point (rules 4006 and 4007). `files`: the findings of each.
 void forgiveEmptyFrames(std::vector<std::vector<Finding>>& files) {
     std::map<std::pair<int, std::string>, std::size_t> counts;
     const auto isOfFrame = [](const Finding& f) {
