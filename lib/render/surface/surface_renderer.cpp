@@ -181,7 +181,8 @@ void SurfaceRenderer::findNormals() {
     }
     const auto ofView = [&](std::size_t i) {
         const ReferenceView view = scene_.set.copyOfView(i);
-        const DepthSurface surface = depthSurface(view, {});
+        DepthSurface surface = depthSurface(view, {});
+        continueSlopes(view.camera, surface);  // as in baked views
         const glm::dmat3 worldFromCamera = glm::mat3_cast(view.camera.orientation);
         for (const PageRectangle& r : scene_.set.rectanglesOf(i)) {
             const auto page = static_cast<std::size_t>(r.page);

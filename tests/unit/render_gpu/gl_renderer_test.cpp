@@ -2,8 +2,10 @@
 
 #include "lib/packing/packing.hpp"
 #include "lib/render/splat/gl/gl_points.hpp"
+#include "lib/surface/normals.hpp"
 #include "tests/painted_environment.hpp"
 #include "tests/unit/render_gpu/gpu_fixture.hpp"
+#include "tests/unit/surface/analytic.hpp"
 
 namespace stx {
 namespace {
@@ -30,6 +32,21 @@ TEST(GlPoints, GrowAsTheCameraComesNearer) {
     EXPECT_EQ(groups.groups[0].size, 3);
     groupPoints(points, splatSettings(SplatRule::point), camera, 255, groups);
     EXPECT_EQ(groups.groups[0].size, 1);
+}
+
+TEST(GlPoints, HaveTheNormalsThatTheirViewWouldBeBakedWith) {
+    Bundle plain;
+    plain.views.push_back(
+        analytic::capture(analytic::torus, analytic::lookingAt({1.2, 0.8, 2.8}, 64), 32));
+    Bundle baked = plain;
+    Job job;
+    ASSERT_TRUE(bake(baked, {}, job));
+    const gl::PointArrays a = gl::makePointArrays(plain, true),
+                          b = gl::makePointArrays(baked, true);
+    ASSERT_EQ(a.normals.size(), b.normals.size());
+    EXPECT_GT(a.normals.size(), 500u);
+    for (std::size_t i = 0; i < a.normals.size(); ++i)
+        ASSERT_LT(glm::length(a.normals[i] - b.normals[i]), 1e-4f) << i;
 }
 
 TEST(GlPoints, BehindTheCameraAreLeftOut) {

@@ -10,7 +10,8 @@ namespace {
 /// The normals of a view that brings none: of its depth as a surface.
 Image<glm::vec3> normalsOf(const ReferenceView& view) {
     const Camera& camera = view.camera;
-    const DepthSurface surface = depthSurface(view, BakeSettings{});
+    DepthSurface surface = depthSurface(view, BakeSettings{});
+    continueSlopes(camera, surface);  // as in baked views
     Image<glm::vec3> out(camera.width, camera.height, glm::vec3(0));
     parallelFor(0, camera.height, [&](int y) {
         for (int x = 0; x < camera.width; ++x) {
