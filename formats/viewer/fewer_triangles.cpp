@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <utility>
 
 #include <meshoptimizer.h>
 
@@ -78,9 +80,35 @@ void dropCorners(ViewSurface& surface) {
     surface.positions = std::move(positions);
 }
 
+/// Twice the area of a triangle in pixels, whose sign says which way round its corners go.
+std::int64_t turnOf(const ViewSurface& surface, const std::uint32_t* corners) {
+    const glm::i64vec2 a(surface.pixels[corners[0]]), b(surface.pixels[corners[1]]),
+        c(surface.pixels[corners[2]]);
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+/// Which way round most of a view's picture is covered.
+std::int64_t turnOfAll(const ViewSurface& surface) {
+    std::int64_t sum = 0;
+    for (std::size_t t = 0; t < surface.triangles.size(); t += 3)
+        sum += turnOf(surface, &surface.triangles[t]);
+    return sum;
+}
+
+/// Turns round the triangles that were folded over. A view sees no surface from behind, and viewers
+/// light a side that is turned away with its normal turned, too. `all`: turnOfAll() of before.
+void faceTheView(std::int64_t all, ViewSurface& surface) {
+    for (std::size_t t = 0; t < surface.triangles.size(); t += 3) {
+        const std::int64_t turn = turnOf(surface, &surface.triangles[t]);
+        if ((turn > 0 && all < 0) || (turn < 0 && all > 0))
+            std::swap(surface.triangles[t + 1], surface.triangles[t + 2]);
+    }
+}
+
 void simplify(const Bundle& bundle, const Camera& camera, double share, ViewSurface& surface) {
     const std::vector<glm::vec3> places = inPixels(bundle, camera, surface);
     std::vector<std::uint32_t> fewer(surface.triangles.size());
+    const std::int64_t all = turnOfAll(surface);
     const auto wanted =
         static_cast<std::size_t>(share * static_cast<double>(surface.triangles.size() / 3));
     // Of the error that it may make: that of all triangles away.
@@ -89,6 +117,7 @@ void simplify(const Bundle& bundle, const Camera& camera, double share, ViewSurf
                                   &places[0].x, places.size(), sizeof(glm::vec3), 3 * wanted,
                                   kAnyError, 0, nullptr));
     surface.triangles = std::move(fewer);
+    faceTheView(all, surface);
     dropCorners(surface);
 }
 

@@ -7,6 +7,7 @@
 
 #include "formats/files/file_spool.hpp"
 #include "formats/meshes/meshes.hpp"
+#include "formats/viewer/fewer_triangles.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
 #include "tests/small_bundle.hpp"
 #include "tests/temporary_folder.hpp"
@@ -365,6 +366,27 @@ TEST(SurfacesGlb, WithFewerTrianglesIsTheSameSurfaces) {
     }
     EXPECT_LT(2 * std::filesystem::file_size(folder.path() / "b.glb"),
               std::filesystem::file_size(folder.path() / "a.glb"));
+}
+
+/// Where corners are moved across a triangle's side, it would be folded over.
+TEST(SurfacesGlb, WithFewerTrianglesTurnsNoneAway) {
+    Job job;
+    const Bundle bundle = torusViews(64);
+    for (const std::size_t most : {200u, 800u, 3000u}) {
+        auto surfaces = viewSurfaces(bundle, job);
+        ASSERT_TRUE(surfaces) << surfaces.error().text();
+        ASSERT_TRUE(takeFewerTriangles(bundle, most, *surfaces, job));
+        int away = 0;
+        for (const ViewSurface& s : *surfaces) {
+            for (std::size_t t = 0; t < s.triangles.size(); t += 3) {
+                const glm::ivec2 a = s.pixels[s.triangles[t]], b = s.pixels[s.triangles[t + 1]],
+                                 c = s.pixels[s.triangles[t + 2]];
+                // Rows go downward: counter-clockwise is below 0.
+                away += (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x) > 0;
+            }
+        }
+        EXPECT_EQ(away, 0) << most;
+    }
 }
 
 /// Views from all sides show each other's dents.
