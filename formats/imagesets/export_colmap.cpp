@@ -1,5 +1,6 @@
 #include "formats/imagesets/export_colmap.hpp"
 
+#include <atomic>
 #include <bit>
 #include <map>
 
@@ -81,7 +82,6 @@ Result<void> exportColmap(const ViewTable& table, const path& folder,
                         "view '{}' is orthographic; COLMAP has perspective cameras only (--cameras "
                         "transforms has both)",
                         bundle.views[i].name);
-        if (table.kindsOf(i).linear) job.note("linear colours are written as 8-bit sRGB");
         if (bundle.views[i].pruned)
             job.note(
                 "the views are pruned, which a COLMAP workspace cannot say: what reads it takes "
@@ -105,13 +105,17 @@ Result<void> exportColmap(const ViewTable& table, const path& folder,
     // COLMAP opens no model without it.
     STX_CHECK(
         writeWhole(root / "sparse/points3D.txt", fmt::format("{}: no points\n", kWrittenByUs)));
+    std::atomic<bool> linear = false, clipped = false;
     const auto write = [&](std::size_t i,
                            const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
+        if (view->texture.isLinear()) linear = true;
+        if (isBeyondWhite(view->texture)) clipped = true;
         STX_CHECK(writePicture(view->texture, root / fmt::format("images/{}.png", names[i])));
         return writeDepth(view->depth,
                           root / fmt::format("stereo/depth_maps/{}.png.geometric.bin", names[i]));
     };
     STX_CHECK(forEachView(table, peak::kExport, job, write));
+    Rgba8Loss{.linear = linear, .clipped = clipped}.note(job);
     return output.commit();
 }
 

@@ -172,7 +172,11 @@ Json pageCamera(const Camera& c, const std::string& name) {
 void codeColours(Bundle& bundle, std::string_view what, Job& job, PixelSpool* spool) {
     const bool linear = std::ranges::any_of(
         bundle.views, [](const ReferenceView& v) { return v.texture.isLinear(); });
-    if (linear) job.note(fmt::format("colours of linear light become 8-bit sRGB in {}", what));
+    const bool clipped = std::ranges::any_of(
+        bundle.views, [](const ReferenceView& v) { return isBeyondWhite(v.texture); });
+    if (linear)
+        job.note(fmt::format("colours of linear light become 8-bit sRGB in {}{}", what,
+                             clipped ? "; values above 1 are clipped" : ""));
     for (auto& view : bundle.views) {
         const auto* floats = view.texture.rgbaFloat();
         if (!floats) continue;

@@ -442,8 +442,17 @@ TEST(SurfacesGlb, SaysWhatItRounds) {
     ASSERT_TRUE(writeSurfaces(folder.path() / "a.glb", bundle, {}, job));
     const auto notes = job.takeNotes();
     ASSERT_EQ(notes.size(), 2u);
-    EXPECT_NE(notes[0].find("8-bit sRGB in the model"), std::string::npos);
+    EXPECT_EQ(notes[0],
+              "colours of linear light become 8-bit sRGB in the model; values above 1 are clipped");
     EXPECT_NE(notes[1].find("stays at the origin"), std::string::npos);
+    // The colours reach up to 4.
+    bundle.origin = {};
+    for (ReferenceView& view : bundle.views)
+        for (glm::vec4& c : view.texture.rgbaFloat()->pixels())
+            c = glm::vec4(glm::vec3(c) / 4.0f, c.a);
+    ASSERT_TRUE(writeSurfaces(folder.path() / "b.glb", bundle, {}, job));
+    EXPECT_EQ(job.takeNotes(),
+              std::vector<std::string>{"colours of linear light become 8-bit sRGB in the model"});
 }
 
 TEST(SurfacesGlb, LeavesNothingWhenItFails) {

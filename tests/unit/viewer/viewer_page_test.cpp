@@ -112,7 +112,8 @@ TEST(ViewerPage, SaysWhatItRounds) {
     ASSERT_TRUE(write(smallBundle(2, 32, false, true), folder.path() / "a.html", job));
     const auto notes = job.takeNotes();
     ASSERT_EQ(notes.size(), 2u);
-    EXPECT_NE(notes[0].find("8-bit sRGB"), std::string::npos);
+    EXPECT_NE(notes[0].find("8-bit sRGB in the page; values above 1 are clipped"),
+              std::string::npos);
     EXPECT_NE(notes[1].find("becomes 16"), std::string::npos);
 }
 
