@@ -1,6 +1,5 @@
 #include "tools/view_tally.hpp"
 
-#include <algorithm>
 #include <numeric>
 #include <utility>
 
@@ -24,7 +23,6 @@ std::string PictureSizes::text() const {
 void ViewTally::add(std::size_t index, const ReferenceView& view) {
     const std::int64_t points = view.pointCount();
     const std::lock_guard lock(mutex_);
-    points_.resize(std::max(points_.size(), index + 1));
     points_[index] = points;
 }
 
@@ -34,7 +32,8 @@ void ViewTally::addSize(const Camera& camera) {
 }
 
 std::int64_t ViewTally::points() const {
-    return std::accumulate(points_.begin(), points_.end(), std::int64_t{0});
+    return std::accumulate(points_.begin(), points_.end(), std::int64_t{0},
+                           [](std::int64_t sum, const auto& view) { return sum + view.second; });
 }
 
 std::unique_ptr<Sequence> tallied(std::unique_ptr<Sequence> frames, ViewTally& tally) {

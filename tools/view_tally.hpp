@@ -1,10 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <vector>
 
 #include "lib/model/sequence.hpp"
 
@@ -37,7 +37,7 @@ class ViewTally {
 
   private:
     std::mutex mutex_;
-    std::vector<std::int64_t> points_;
+    std::map<std::size_t, std::int64_t> points_;  ///< by the view's number
     PictureSizes sizes_;
 };
 

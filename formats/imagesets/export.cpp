@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <utility>
+#include <vector>
 
 #include <glm/gtc/constants.hpp>
 #include <nlohmann/json.hpp>
@@ -10,6 +13,8 @@
 #include "formats/files/messages.hpp"
 #include "formats/imagesets/export_colmap.hpp"
 #include "formats/imagesets/export_files.hpp"
+#include "lib/base/counted.hpp"
+#include "lib/model/some_views.hpp"
 
 namespace stx {
 namespace {
@@ -148,10 +153,35 @@ Result<Head> headOf(const ViewTable& table, const std::vector<std::string>& name
     return head;
 }
 
+/// The views that are photographs, for COLMAP, which has no mark for background views: what reads a
+/// workspace would take them for photographs of the same moment. Null: all are. The table must
+/// outlive it.
+Result<std::unique_ptr<ViewTable>> withoutBackgrounds(const ViewTable& table, Job& job) {
+    const std::vector<ReferenceView>& views = table.about().views;
+    std::vector<std::size_t> kept;
+    for (std::size_t i = 0; i < views.size(); ++i)
+        if (!views[i].background) kept.push_back(i);
+    if (kept.size() == views.size()) return nullptr;
+    if (kept.empty())
+        return fail(ErrorCode::invalidInput,
+                    "all views are background views, for which COLMAP's workspace has no mark; "
+                    "--cameras transforms keeps it");
+    const std::size_t left = views.size() - kept.size();
+    job.note(
+        fmt::format("{} {} left out: COLMAP's workspace has no mark for them, and what reads "
+                    "it would take them for photographs (--cameras transforms keeps them)",
+                    counted(left, "background view"), left == 1 ? "is" : "are"));
+    return someViewsOf(table, std::move(kept));
+}
+
 }  // namespace
 
 Result<void> exportViews(const ViewTable& table, const path& folder, const ExportOptions& options,
                          Job& job) {
+    if (options.kind == ExportOptions::Kind::colmap) {
+        STX_TRY(const auto others, withoutBackgrounds(table, job));
+        if (others) return exportViews(*others, folder, options, job);
+    }
     // Units and ranges follow from all planes.
     if (!table.planesKnown()) {
         STX_TRY(const auto whole, wholeBundle(table, job));

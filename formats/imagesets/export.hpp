@@ -35,8 +35,10 @@ struct ExportOptions {
 /// 8-bit colour is PNG with its coverage, linear colour OpenEXR or PNG. Normals and splats are
 /// dropped with a note. Cameras are in the world's coordinates, the bundle's origin added (it is
 /// kept as stx:origin). The environment is environment.exr, named as stx:environment (not for
-/// COLMAP). readImageSet() gives the same bundle again. Errors: io; invalidInput for what the kind
-/// cannot say; (usage) Depth::npy of another kind than transforms.
+/// COLMAP). readImageSet() gives the same bundle again. Background views are left out of COLMAP's
+/// workspace, which has no mark for them, with a note. Errors: io; invalidInput for what the kind
+/// cannot say, and for COLMAP's workspace of background views alone; (usage) Depth::npy of another
+/// kind than transforms.
 [[nodiscard]] Result<void> exportViews(const ViewTable& table, const std::filesystem::path& folder,
                                        const ExportOptions& options, Job& job);
 

@@ -81,6 +81,55 @@ TEST(Export, CutOutsOfColmapKeepWhatIsNotKnown) {
     EXPECT_EQ(back->views[0].texture.alpha(0), 0.0f);
 }
 
+/// What reads a workspace would take them for photographs.
+TEST(Export, ColmapHasNoBackgroundViews) {
+    Bundle bundle = smallBundle(3, 32, false, false);
+    std::erase_if(bundle.views, [](const ReferenceView& v) { return v.camera.orthographic; });
+    ASSERT_EQ(bundle.views.size(), 2u);
+    bundle.views[0].background = true;
+    TemporaryFolder folder;
+    Job job;
+    ExportOptions options;
+    options.kind = Kind::colmap;
+    const auto written = exportViews(*viewsOf(bundle), folder / "set", options, job);
+    ASSERT_TRUE(written) << written.error().text();
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("1 background view is left out"), std::string::npos) << notes[0];
+    ImageSetOptions reading;
+    reading.refine = *RefineSettings::from("off");
+    const auto back = readImageSet(folder / "set", reading, job);
+    ASSERT_TRUE(back) << back.error().text();
+    ASSERT_EQ(back->views.size(), 1u);
+    EXPECT_EQ(back->views[0].depth.size(), bundle.views[1].depth.size());
+    // Of backgrounds alone there is nothing to write.
+    bundle.views[1].background = true;
+    const auto none = exportViews(*viewsOf(bundle), folder / "none", options, job);
+    ASSERT_FALSE(none);
+    EXPECT_EQ(none.error().code, ErrorCode::invalidInput);
+    EXPECT_FALSE(std::filesystem::exists(folder / "none"));
+}
+
+TEST(Export, ColmapSaysWhatLinearColoursLose) {
+    for (const bool bright : {false, true}) {
+        Bundle bundle = smallBundle(1, 32, false, true);
+        // They reach up to 4.
+        if (!bright)
+            for (glm::vec4& c : bundle.views[0].texture.rgbaFloat()->pixels())
+                c = glm::vec4(glm::vec3(c) / 4.0f, c.a);
+        TemporaryFolder folder;
+        Job job;
+        ExportOptions options;
+        options.kind = Kind::colmap;
+        const auto written = exportViews(*viewsOf(bundle), folder / "set", options, job);
+        ASSERT_TRUE(written) << written.error().text();
+        EXPECT_EQ(job.takeNotes(),
+                  std::vector<std::string>{
+                      bright ? "linear colour becomes 8-bit sRGB; values above 1 are clipped"
+                             : "linear colour becomes 8-bit sRGB"});
+    }
+}
+
 /// What other programs see: the same points without the keys that only we know, for perspective
 /// and orthographic cameras with principal points off the middle, and for masks.
 TEST(Export, ComesBackWithoutOurOwnKeys) {
