@@ -181,15 +181,16 @@ struct Extracted {
 
 /// What the points of views lose in a file.
 struct PointLosses {
-    std::atomic<bool> translucent = false, beyondWhite = false;
+    std::atomic<bool> translucent = false, linear = false, beyondWhite = false;
 
     void look(const ReferenceView& view) {
         if (hasTranslucentInside(view.texture, view.depth)) translucent = true;
+        if (view.texture.isLinear()) linear = true;
         if (isBeyondWhite(view.texture)) beyondWhite = true;
     }
     void note(Job& job) const {
         if (translucent) job.note("points of translucent surfaces are opaque in the file");
-        if (beyondWhite) Rgba8Loss{.linear = true, .clipped = true}.note(job);
+        Rgba8Loss{.linear = linear, .clipped = beyondWhite}.note(job);
     }
 };
 

@@ -97,7 +97,7 @@ Result<void> exportPicture(const ReferenceView& view, const std::filesystem::pat
         fmt::format("the depth is grey, white near, and has no scale any more: black is {:.6g}, "
                     "white {:.6g} scene units",
                     range.second, range.first));
-    if (isBeyondWhite(view.texture)) Rgba8Loss{.linear = true, .clipped = true}.note(job);
+    Rgba8Loss{.linear = view.texture.isLinear(), .clipped = isBeyondWhite(view.texture)}.note(job);
     Picture colour = picture(together ? 2 * width : width, 3);
     putColour(view.texture, colour);
     Picture depth = together ? Picture{} : picture(width, 1);

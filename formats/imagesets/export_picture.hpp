@@ -20,8 +20,8 @@ enum class DepthPicture {
 /// Writes a view as a picture with depth, each file whole or not at all, as PNG or JPEG by its
 /// ending. Colour is 8-bit sRGB with black behind it. Depth is grey of 8 bits, white near, linear
 /// in 1 / distance from the nearest point to the farthest; black, too, where there is none. What
-/// reads it gets no scale: a note says the range, and another that colours beyond white are
-/// clipped. `jpegQuality`: 1..100, of the colour, and of the depth where both are in one file; a
+/// reads it gets no scale: a note says the range, and another what linear colours lose in 8
+/// bits. `jpegQuality`: 1..100, of the colour, and of the depth where both are in one file; a
 /// depth of its own has 100. Errors: (usage) another ending; (invalidInput) a view without a point;
 /// files.
 [[nodiscard]] Result<void> exportPicture(const ReferenceView& view,
