@@ -198,7 +198,7 @@ struct PointLosses {
 Result<Extracted> extractPly(const ExtractOptions& o, const PeakMemory& takes, Sequence& frames,
                              std::size_t moment, Program& program) {
     STX_TRY(const auto table, frames.views(moment, program.job));
-    const bool normals = std::ranges::all_of(table->kinds(), &ViewImageKinds::normal);
+    const bool normals = allHaveNormals(*table, program.job);
     const glm::dvec3 origin = std::as_const(*table).about().origin;
     noteEnvironmentLeftOut(std::as_const(*table).about().environment, program.job);
     noteMaterialLeftOut(*table, program.job);
@@ -231,7 +231,7 @@ Result<Extracted> extractPoints(const ExtractOptions& o, const PeakMemory& takes
     STX_CHECK(checkPeak(takes, bundle.views, program.job.limits));
     noteEnvironmentLeftOut(bundle.environment, program.job);
     bundle.noteMaterialLeftOut(program.job);
-    const bool normals = std::ranges::all_of(bundle.views, &ReferenceView::hasNormals);
+    const bool normals = allHaveNormals(*viewsOf(bundle), program.job);
     Points found;
     PointLosses losses;
     for (const ReferenceView& view : bundle.views) {

@@ -17,6 +17,7 @@
 #include "lib/geometry/view_layout.hpp"
 #include "lib/model/peak_memory.hpp"
 #include "lib/model/translucent.hpp"
+#include "lib/model/view_table.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
 
 namespace stx {
@@ -232,8 +233,7 @@ class Writer {
   public:
     Writer(const Bundle& bundle, const SurfacesOptions& options, Job& job)
         : bundle_(bundle), jpegQuality_(options.jpegQuality), job_(job), model_(options.spool) {
-        lit_ = std::ranges::all_of(bundle.views,
-                                   [](const ReferenceView& v) { return v.hasNormals(); });
+        lit_ = allHaveNormals(*viewsOf(bundle), job);
     }
 
     /// Takes the colours of other surfaces out of the view's.

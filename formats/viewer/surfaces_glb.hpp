@@ -34,7 +34,8 @@ struct SurfacesReport {
 /// its up (upOfCameras()) is not +Y, as glTF has it, a node above all others turns them. A bundle
 /// with an origin stays at it, and the origin, turned, too, is in `asset.extras.origin`.
 ///
-/// Notes: an origin, a turn, colours of linear light, translucent surfaces, which become opaque.
+/// Notes: an origin, a turn, colours of linear light, normals that some views lack, translucent
+/// surfaces, which become opaque.
 /// Errors: a bundle that fails check(), no surface and no point, points beyond floats, more than
 /// GLB's 4 GiB, memory over the limit, files, cancelled.
 [[nodiscard]] Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle bundle,

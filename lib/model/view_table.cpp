@@ -293,6 +293,17 @@ void noteMaterialLeftOut(const ViewTable& table, Job& job) {
             "them");
 }
 
+bool allHaveNormals(const ViewTable& table, Job& job) {
+    const auto all = static_cast<std::int64_t>(table.count());
+    const auto with = std::ranges::count_if(table.kinds(), &ViewImageKinds::normal);
+    if (with > 0 && with < all)
+        job.note(
+            fmt::format("normals are left out, since {} of {} views {} none; stx bake "
+                        "--keep-normals makes them where they are missing",
+                        all - with, all, all - with == 1 ? "has" : "have"));
+    return with == all;
+}
+
 std::unique_ptr<ViewTable> changedViews(std::unique_ptr<ViewTable> table, ViewChange change) {
     std::vector<ViewImageKinds> kinds = table->kinds();
     if (change.kinds)

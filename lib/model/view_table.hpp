@@ -124,6 +124,9 @@ class ViewTable {
 
 /// As Bundle::noteMaterialLeftOut().
 void noteMaterialLeftOut(const ViewTable& table, Job& job);
+/// Whether all views have normals, as a file needs it whose points all have the same values. A note
+/// says that normals are left out where only some views have them.
+[[nodiscard]] bool allHaveNormals(const ViewTable& table, Job& job);
 
 /// A change of single views: it looks at nothing but the one that it is given.
 struct ViewChange {

@@ -426,12 +426,23 @@ TEST(SurfacesGlb, WithFewerTrianglesJoinsNoParts) {
 }
 
 TEST(SurfacesGlb, HasNormalsWhereTheBundleDoes) {
+    constexpr const char* kSaid =
+        "normals are left out, since 1 of 2 views has none; stx bake --keep-normals makes them "
+        "where they are missing";
     const TemporaryFolder folder;
     Job job;
     ASSERT_TRUE(writeSurfaces(folder.path() / "a.glb", smallBundle(2, 16, true, false), {}, job));
+    EXPECT_EQ(std::ranges::count(job.takeNotes(), kSaid), 0);
     const auto with = readMesh(folder.path() / "a.glb", job);
     ASSERT_TRUE(with) << with.error().text();
     EXPECT_FALSE(with->normals.empty());
+    Bundle some = smallBundle(2, 16, true, false);
+    some.views[1].normal = {};
+    ASSERT_TRUE(writeSurfaces(folder.path() / "b.glb", some, {}, job));
+    EXPECT_EQ(std::ranges::count(job.takeNotes(), kSaid), 1);
+    const auto without = readMesh(folder.path() / "b.glb", job);
+    ASSERT_TRUE(without) << without.error().text();
+    EXPECT_TRUE(without->normals.empty());
 }
 
 TEST(SurfacesGlb, SaysWhatItRounds) {
