@@ -125,11 +125,11 @@ Result<Head> headOf(const ViewTable& table, const std::vector<std::string>& name
     } else {
         head.json["stx:title"] = bundle.title;
         if (!floats) {
-            // Millimetres where they reach, else the finest unit that does.
+            double farthest = 0;
             for (const ReferenceView& view : bundle.views)
-                head.unit = std::max(head.unit, view.farPlane / 65535);
+                farthest = std::max(farthest, view.farPlane);
+            head.unit = integerDepthUnit(farthest, {}, job);
             head.json["integer_depth_scale"] = head.unit;
-            job.note(fmt::format("depth is rounded to steps of {:.3g} scene units", head.unit));
         }
     }
     const glm::dvec3& o = bundle.origin;

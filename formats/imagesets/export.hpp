@@ -19,8 +19,8 @@ struct ExportOptions {
     Kind kind = Kind::transforms;
     enum class Depth {
         exr,  ///< OpenEXR floats, which come back exactly
-        png,  ///< 16 bits: millimetres (or what fits) in transforms.json, normalised disparity in
-              ///< MIV, with a note of the rounding
+        png,  ///< 16 bits: millimetres (or what fits small and large scenes) in transforms.json,
+              ///< normalised disparity in MIV, with a note of the rounding
         npy,  ///< NumPy's floats, as exact; transforms.json only
     };
     Depth depth = Depth::exr;

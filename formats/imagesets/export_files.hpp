@@ -41,6 +41,16 @@ class ColourLoss {
     std::atomic<bool> clipped_ = false, rounded_ = false;
 };
 
+/// How far integer depth reaches, times the farthest distance, where it does not count in
+/// millimetres: in scenes that are too small and in those that are too large for them.
+struct DepthReach {
+    double small = 1, large = 1;
+};
+/// The unit of integer depth for distances up to `farthest`, scene units: 0.001, which nerfstudio
+/// takes without being asked, where that has at least 1,000 steps and codes for all of them. A note
+/// says it.
+[[nodiscard]] double integerDepthUnit(double farthest, const DepthReach& reach, Job& job);
+
 /// ".exr", ".png" or ".npy".
 [[nodiscard]] const char* endingOf(ExportOptions::Depth depth);
 /// Depth as floats of OpenEXR or NumPy, by the file's ending, or as 16-bit PNG of code(distance),

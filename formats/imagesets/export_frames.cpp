@@ -15,6 +15,11 @@ using namespace imagesets;
 
 namespace fs = std::filesystem;
 
+/// One unit is for all frames, with codes for things that go away from the camera: to twice the
+/// farthest distance of the first frame. Small scenes have codes to spare: 4,095 steps to that
+/// distance are fine enough, and next to nothing goes 16 times as far.
+constexpr DepthReach kFilmReach{.small = 16, .large = 2};
+
 /// A folder of transforms.json, images/ and depth/ that fills frame by frame.
 class FrameExporter {
   public:
@@ -105,10 +110,8 @@ class FrameExporter {
         for (const ReferenceView& view : bundle.views) farthest = std::max(farthest, view.farPlane);
         first_ = headersOf(bundle);
         if (options_.depth == ExportOptions::Depth::png) {
-            // One unit for all frames, with room for things that go away from the camera.
-            if (2 * farthest > unit_ * 65535) unit_ = 2 * farthest / 65535;
+            unit_ = integerDepthUnit(farthest, kFilmReach, job_);
             json_["integer_depth_scale"] = unit_;
-            job_.note(fmt::format("depth is rounded to steps of {:.3g} scene units", unit_));
         }
         tracks_.resize(bundle.views.size());
         names_ = fileNames(bundle);

@@ -205,6 +205,92 @@ TEST(Export, IntegerDepthIsRoundedByNoMoreThanItsNoteSays) {
     }
 }
 
+/// A bundle of one view whose depth is `scale` times that of smallBundle(), 0.1 to 3.1.
+Bundle scaledBundle(double scale) {
+    Bundle bundle = smallBundle(1, 32, false, false);
+    ReferenceView& view = bundle.views[0];
+    for (float& distance : view.depth.pixels())
+        if (hasPoint(distance)) distance = static_cast<float>(distance * scale);
+    view.nearPlane *= 0.99 * scale;
+    view.farPlane *= 1.01 * scale;
+    bundle.bounds = bundle.computeBounds();
+    return bundle;
+}
+
+double unitIn(const std::filesystem::path& folder) {
+    return nlohmann::json::parse(std::ifstream(folder / "transforms.json"))
+        .at("integer_depth_scale")
+        .get<double>();
+}
+
+void expectDepth(const ReferenceView& is, const ReferenceView& expected, double unit) {
+    for (std::size_t p = 0; p < expected.depth.count(); ++p) {
+        const float a = is.depth.data()[p], b = expected.depth.data()[p];
+        ASSERT_EQ(hasPoint(a), hasPoint(b));
+        if (hasPoint(b)) {
+            // Half a step, and what a float rounds.
+            ASSERT_NEAR(a, b, 0.5 * unit + 1e-6 * b);
+        }
+    }
+}
+
+TEST(Export, IntegerDepthHasStepsThatFitTheScene) {
+    for (const double scale : {1e-4, 1.0, 100.0}) {
+        const Bundle bundle = scaledBundle(scale);
+        TemporaryFolder folder;
+        Job job;
+        ExportOptions options;
+        options.depth = ExportOptions::Depth::png;
+        ASSERT_TRUE(exportViews(*viewsOf(bundle), folder / "set", options, job));
+        const auto notes = job.takeNotes();
+        ASSERT_EQ(notes.size(), 1u);
+        // nerfstudio takes millimetres unless it is asked for others.
+        EXPECT_EQ(notes[0].find("nerfstudio") == std::string::npos, scale == 1.0) << notes[0];
+        const double unit = unitIn(folder / "set");
+        EXPECT_DOUBLE_EQ(unit, scale == 1.0 ? 0.001 : bundle.views[0].farPlane / 65535);
+        ImageSetOptions read;
+        read.depthBits = 32;
+        read.refine = *RefineSettings::from("off");
+        const auto back = readImageSet(folder / "set", read, job);
+        ASSERT_TRUE(back) << back.error().text();
+        expectDepth(back->views[0], bundle.views[0], unit);
+    }
+}
+
+/// What is small at first and ten times as far away a moment later.
+class GoingAway : public Sequence {
+  public:
+    GoingAway() { timeline_ = steadyTimeline(2, 25); }
+    Result<Bundle> frame(std::size_t index, Job&) override {
+        Bundle bundle = scaledBundle(index == 0 ? 1e-4 : 1e-3);
+        setTime(bundle, index);
+        return bundle;
+    }
+};
+
+TEST(Export, IntegerDepthOfSmallFilmsHasStepsThatFit) {
+    GoingAway film;
+    TemporaryFolder folder;
+    Job job;
+    ExportOptions options;
+    options.depth = ExportOptions::Depth::png;
+    const auto written = exportFrames(film, folder / "set", options, job);
+    ASSERT_TRUE(written) << written.error().text();
+    const double unit = unitIn(folder / "set");
+    EXPECT_DOUBLE_EQ(unit, 16 * film.frame(0, job)->views[0].farPlane / 65535);
+    ImageSetOptions read;
+    read.depthBits = 32;
+    read.refine = *RefineSettings::from("off");
+    const auto back = openImageSet(folder / "set", read, job);
+    ASSERT_TRUE(back) << back.error().text();
+    ASSERT_EQ((*back)->timeline().count(), 2u);
+    for (std::size_t i = 0; i < 2; ++i) {
+        const auto frame = (*back)->frame(i, job);
+        ASSERT_TRUE(frame) << frame.error().text();
+        expectDepth(frame->views[0], film.frame(i, job)->views[0], unit);
+    }
+}
+
 /// From 1000 on MIV takes the farthest distance for infinite: a scene in millimetres has its views
 /// there, and so may even its nearest distance be.
 TEST(Export, ScenesInMillimetresComeBackFromMiv) {
