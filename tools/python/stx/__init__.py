@@ -11,7 +11,7 @@ centre is (0.5, 0.5); depth is planar, the distance to the plane through the vie
 Arrays that objects give show their memory: they are read-only and keep it alive.
 
 Calls raise stx.Error, give notes as warnings of kind stx.Note (or to their job), let other threads of Python work,
-and stop within a second when Ctrl-C is pressed.
+and stop within a second when Ctrl-C is pressed; what writes .mp4, .xmt or .bt, with the view that it writes.
 """
 from __future__ import annotations
 
