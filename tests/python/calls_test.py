@@ -271,10 +271,10 @@ class Calls(Case):
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "left\n", ""))
 
     def test_progress_hears_the_end(self):
-        told = []
+        heard = []
         bundle = stx.convert(self.mesh, views="ring:3", size=(64, 64), job=stx.Job())
-        stx.bake(bundle, job=stx.Job(progress=lambda *news: told.append(news)))
-        self.assertEqual(told[-1], (3, 3, "baking normals and splats"))
+        stx.bake(bundle, job=stx.Job(progress=lambda *news: heard.append(news)))
+        self.assertEqual(heard[-1], (3, 3, "baking normals and splats"))
 
         def progress(done, total, what):
             if done == total:

@@ -103,7 +103,13 @@ class Unlocked {
 void tellProgress(JobHandle* handle, LastProgress& progress) {
     const auto news = progress.take();
     if (!news) return;
-    withoutBeingEnded([&] { handle->progress(news->done, news->total, textFrom(news->what)); });
+    const py::tuple arguments = py::make_tuple(news->done, news->total, textFrom(news->what));
+    // Python's own function, so that no object is between it and who waits.
+    PyObject* answer = nullptr;
+    withoutBeingEnded(
+        [&] { answer = PyObject_CallObject(handle->progress.ptr(), arguments.ptr()); });
+    if (!answer) throw py::error_already_set();
+    Py_DECREF(answer);
 }
 
 /// Says what is new; an exception of Python's signal handlers or of the progress function.
