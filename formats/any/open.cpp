@@ -240,6 +240,11 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
             break;
         case FileKind::numbered: {
             STX_TRY(const auto files, numberedFiles(path.string()));
+            if (files.size() > 1)
+                job.note(
+                    fmt::format("'{}' has {} frames; only the first, '{}', is read (stx render "
+                                "--time and --times show the rest)",
+                                path.string(), files.size(), files.front().path.string()));
             return openRenderable(files.front().path, options, job);
         }
         case FileKind::image:

@@ -47,8 +47,8 @@ enum class FileKind {
 [[nodiscard]] Result<Atlas> openAtlas(const std::filesystem::path& path, const OpenOptions& options,
                                       Job& job);
 
-/// Opens whatever can be rendered, of numbered files the first. A bundle passes Bundle::check(), a
-/// mesh Mesh::check().
+/// Opens whatever can be rendered, of numbered files the first, with a note where there are more. A
+/// bundle passes Bundle::check(), a mesh Mesh::check().
 [[nodiscard]] Result<std::variant<Mesh, Bundle>> openRenderable(const std::filesystem::path& path,
                                                                 const OpenOptions& options,
                                                                 Job& job);

@@ -204,6 +204,10 @@ Result<void> saveEnvironment(const Environment& environment, const fs::path& tar
     if (options.faceSize < 0 || options.faceSize > job.limits.maxImageSide)
         return fail(ErrorCode::usage, "faces of {} pixels; 1 to {} are possible", options.faceSize,
                     job.limits.maxImageSide);
+    if (options.jpegQuality < 0 || options.jpegQuality > 100)
+        return fail(ErrorCode::usage,
+                    "the quality of JPEG is {}; 1 to 100, or 0 (PNG), is expected",
+                    options.jpegQuality);
     const OutputFile::Options output{.noClobber = options.noClobber};
     const std::string ending = lower(target.extension().string());
     if (ending.empty()) return saveFaces(environment, target, options, job);

@@ -31,8 +31,8 @@ struct EnvironmentSaveOptions {
 /// (equirectangular, 8-bit sRGB), .exr (latlong, or cube where it is one or faceSize is given;
 /// nothing is lost), .mp4, .bt and .xmt (a scene with a Background and nothing else), no ending: a
 /// folder of six faces. Pictures without a scene hold the environment in the world's axes, with its
-/// sky and ground. What is lossy is noted. Errors: usage (another ending), Environment::check(),
-/// io.
+/// sky and ground. What is lossy is noted. Errors: usage (another ending, options out of range),
+/// Environment::check(), io.
 [[nodiscard]] Result<void> saveEnvironment(const Environment& environment,
                                            const std::filesystem::path& target,
                                            const EnvironmentSaveOptions& options, Job& job);

@@ -10,6 +10,8 @@
 #include "formats/photos/photo.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/metrics/background_colour.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/model/texture.hpp"
 #include "lib/render/compose/environment_behind.hpp"
 #include "lib/render/factory.hpp"
@@ -196,6 +198,10 @@ Result<void> save(const Frame& frame, const std::filesystem::path& target,
         return fail(ErrorCode::usage,
                     "'-' is standard output, which is the program's; a name that ends in .png, "
                     ".jpg, .tif, .webp or .exr is expected");
+    if (options.jpegQuality < 1 || options.jpegQuality > 100)
+        return fail(ErrorCode::usage, "the quality of JPEG is {}; 1 to 100 is expected",
+                    options.jpegQuality);
+    if (options.background) STX_CHECK(metrics::checkBackground(*options.background));
     FrameOptions file;
     file.background = options.background;
     file.jpegQuality = options.jpegQuality;
@@ -207,6 +213,16 @@ Result<void> save(const Frame& frame, const std::filesystem::path& target,
 
 Result<Comparison> compare(const Picture& a, const Picture& b, const CompareSettings& settings,
                            Job& job) {
+    STX_CHECK(job.checkCancelled());
+    // As it was given: the floats have it in linear light.
+    STX_CHECK(metrics::checkBackground(settings.background));
+    // A picture of floats or of 16 bits makes one of the other, too.
+    const auto isWide = [](const Picture& picture) {
+        return picture.isLinear() || !picture.fine.empty();
+    };
+    STX_CHECK(checkPeak(isWide(a) || isWide(b) ? peak::kComparedLinear : peak::kCompared,
+                        std::max({a.coded.count(), a.linear.count(), a.fine.count()}), 0, 0,
+                        job.limits));
     const PicturePair pair(a, b);
     if (a.isLinear() != b.isLinear()) {
         const int bits = pair.codes16() ? 16 : 8;
@@ -215,8 +231,8 @@ Result<Comparison> compare(const Picture& a, const Picture& b, const CompareSett
             bits));
     }
     const CompareSettings own = pair.settings(settings);
-    if (!pair.first()) return compare(a.coded, b.coded, own);
-    STX_TRY(auto found, compare(*pair.first(), *pair.second(), own));
+    if (!pair.first()) return compare(a.coded, b.coded, own, &job);
+    STX_TRY(auto found, compare(*pair.first(), *pair.second(), own, &job));
     if (pair.codes16()) {
         found.worst.difference = inCodes16(found.worst.difference);
         found.white = kWhite16;

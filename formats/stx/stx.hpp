@@ -298,16 +298,17 @@ struct PictureOptions {
     glm::dvec3 origin{0.0};          ///< OpenEXR: what the camera counts from, as originOf() says
 };
 
-/// Writes a picture, whole or not at all, as .png or .jpg (8-bit sRGB) or .exr (linear, with depth,
-/// and normals where the frame has them). Errors: usage (another ending; "-": the standard output
-/// is the program's), io.
+/// Writes a picture, whole or not at all, as .png, .jpg, .tif or .webp (8-bit sRGB) or .exr
+/// (linear, with depth, and normals where the frame has them). Errors: usage (another ending; "-":
+/// the standard output is the program's; options out of range), io.
 [[nodiscard]] Result<void> save(const Frame& frame, const std::filesystem::path& target,
                                 const PictureOptions& options, Job& job);
 
 /// PSNR, SSIM and the worst pixel of two pictures of one size, as PicturePair says, with a note
 /// when only one is linear; of 16 bits the worst pixel is in their codes. The background is
 /// sRGB-coded, as that of PictureOptions. Pictures in memory: compare() of two images. Errors:
-/// invalidInput when sizes disagree or the mask leaves nothing.
+/// invalidInput when sizes disagree, the mask leaves nothing or it takes more memory than the
+/// limits allow; usage (a background that is not of 0..1); failed (cancelled).
 [[nodiscard]] Result<Comparison> compare(const Picture& a, const Picture& b,
                                          const CompareSettings& settings, Job& job);
 

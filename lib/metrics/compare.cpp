@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "lib/base/parallel.hpp"
+#include "lib/metrics/background_colour.hpp"
 #include "lib/metrics/seen_pixel.hpp"
 #include "lib/metrics/ssim.hpp"
 
@@ -59,6 +60,7 @@ Result<void> checkInputs(const Image<P>& a, const Image<P>& b, const CompareSett
                     settings.mask->width(), settings.mask->height(), a.width(), a.height());
     if (!(peakOf(a, settings) > 0) || !std::isfinite(peakOf(a, settings)))
         return fail(ErrorCode::usage, "the peak is {:g}; it must be above 0", settings.peak);
+    STX_CHECK(metrics::checkBackground(settings.background));
     STX_CHECK(checkFinite(a, settings, "first"));
     STX_CHECK(checkFinite(b, settings, "second"));
     return {};
@@ -77,12 +79,14 @@ std::optional<double> decibels(double squaredSum, double values, double peak) {
 
 template <class P>
 Result<Comparison> compareImages(const Image<P>& a, const Image<P>& b,
-                                 const CompareSettings& settings) {
+                                 const CompareSettings& settings, const Job* job) {
     STX_CHECK(checkInputs(a, b, settings));
+    const auto checkStopped = [job] { return job ? job->checkCancelled() : Result<void>(); };
     const double peak = peakOf(a, settings);
     Image<float> lumaA(a.width(), a.height()), lumaB(a.width(), a.height());
     std::vector<RowSums> rows(a.height());
     parallelFor(0, a.height(), kRowsPerTask, [&](int y) {
+        if (!checkStopped()) return;
         RowSums& sums = rows[y];
         for (int x = 0; x < a.width(); ++x) {
             const glm::vec3 ca = seenPixel(a.at(x, y), settings.background);
@@ -100,6 +104,7 @@ Result<Comparison> compareImages(const Image<P>& a, const Image<P>& b,
             sums.y += (ya - yb) * (ya - yb);
         }
     });
+    STX_CHECK(checkStopped());
     RowSums all;
     for (const auto& r : rows) {
         all.rgb += r.rgb;
@@ -119,7 +124,8 @@ Result<Comparison> compareImages(const Image<P>& a, const Image<P>& b,
     // Rounding of the two lumas alone must not make a difference.
     out.psnrY =
         all.different ? decibels(all.y, static_cast<double>(all.pixels), peak) : std::nullopt;
-    out.ssimY = all.different ? meanSsim(lumaA, lumaB, peak, settings.mask) : 1.0;
+    out.ssimY = all.different ? meanSsim(lumaA, lumaB, peak, settings.mask, job) : 1.0;
+    STX_CHECK(checkStopped());
     return out;
 }
 
@@ -152,12 +158,12 @@ Result<Image<glm::u8vec4>> errorImage(const Image<P>& a, const Image<P>& b,
 }  // namespace
 
 Result<Comparison> compare(const Image<glm::u8vec4>& a, const Image<glm::u8vec4>& b,
-                           const CompareSettings& settings) {
-    return compareImages(a, b, settings);
+                           const CompareSettings& settings, const Job* job) {
+    return compareImages(a, b, settings, job);
 }
 Result<Comparison> compare(const Image<glm::vec4>& a, const Image<glm::vec4>& b,
-                           const CompareSettings& settings) {
-    return compareImages(a, b, settings);
+                           const CompareSettings& settings, const Job* job) {
+    return compareImages(a, b, settings, job);
 }
 
 Result<Image<glm::u8vec4>> errorPicture(const Image<glm::u8vec4>& a, const Image<glm::u8vec4>& b,

@@ -6,6 +6,7 @@
 #include <glm/glm.hpp>
 
 #include "lib/base/image.hpp"
+#include "lib/base/job.hpp"
 #include "lib/base/result.hpp"
 
 namespace stx {
@@ -50,13 +51,16 @@ struct Comparison {
 };
 
 /// Compares two 8-bit pictures with straight alpha, in their coded values. The result is the same
-/// on any number of threads. Errors when sizes disagree or nothing is left to compare.
+/// on any number of threads. Errors when sizes disagree or nothing is left to compare, (usage) when
+/// the background is not of 0..1, and when `job`, where there is one, is cancelled.
 [[nodiscard]] Result<Comparison> compare(const Image<glm::u8vec4>& a, const Image<glm::u8vec4>& b,
-                                         const CompareSettings& settings = {});
+                                         const CompareSettings& settings = {},
+                                         const Job* job = nullptr);
 /// The same of float pictures with straight alpha. Errors also on NaN and infinite values that
 /// count, and on a peak that is not positive.
 [[nodiscard]] Result<Comparison> compare(const Image<glm::vec4>& a, const Image<glm::vec4>& b,
-                                         const CompareSettings& settings = {});
+                                         const CompareSettings& settings = {},
+                                         const Job* job = nullptr);
 
 /// A picture of where two pictures differ: the largest difference of the three channels from black
 /// over red and yellow to white, `gain` times enlarged; pixels outside the mask are dark blue.

@@ -33,7 +33,7 @@ using Moments = std::array<double, 6>;
 }  // namespace
 
 Image<float> ssimMap(const Image<float>& a, const Image<float>& b, double peak,
-                     const Image<std::uint8_t>* mask) {
+                     const Image<std::uint8_t>* mask, const Job* job) {
     const Window window = gaussianWindow();
     const double c1 = (0.01 * peak) * (0.01 * peak);
     const double c2 = (0.03 * peak) * (0.03 * peak);
@@ -42,6 +42,7 @@ Image<float> ssimMap(const Image<float>& a, const Image<float>& b, double peak,
     parallelForBlocks(0, height, kWindowRowsPerTask, [&](std::int64_t from, std::int64_t to) {
         std::vector<Moments> column(width);
         for (int y = static_cast<int>(from); y < to; ++y) {
+            if (job && !job->checkCancelled()) return;
             const int y0 = std::max(0, y - kRadius), y1 = std::min(height - 1, y + kRadius);
             std::fill(column.begin(), column.end(), Moments{});
             for (int v = y0; v <= y1; ++v) {
@@ -83,8 +84,8 @@ Image<float> ssimMap(const Image<float>& a, const Image<float>& b, double peak,
 }
 
 double meanSsim(const Image<float>& a, const Image<float>& b, double peak,
-                const Image<std::uint8_t>* mask) {
-    const Image<float> map = ssimMap(a, b, peak, mask);
+                const Image<std::uint8_t>* mask, const Job* job) {
+    const Image<float> map = ssimMap(a, b, peak, mask, job);
     const auto mean = [&](int border) -> std::pair<double, std::int64_t> {
         double sum = 0;
         std::int64_t n = 0;

@@ -82,7 +82,8 @@ std::vector<std::pair<std::size_t, PaddedArea>> boxesOf(const Atlas& atlas, std:
 
 /// Of an atlas or an object.
 template <class Of>
-Result<void> checkPixels(const Of& of) {
+Result<void> checkOwnNumbers(const Of& of) {
+    STX_CHECK(checkOrigin(of.origin));
     if (of.sourcePixels >= 0 && of.keptPixels >= 0) return {};
     return fail(ErrorCode::invalidInput,
                 "sourcePixels is {} and keptPixels {}; 0 or more are expected", of.sourcePixels,
@@ -173,17 +174,20 @@ Result<void> checkNames(const Atlas& atlas) {
 Result<void> Atlas::check() const {
     if (views.empty()) return fail(ErrorCode::invalidInput, "the atlas has no reference view");
     if (pages.empty()) return fail(ErrorCode::invalidInput, "the atlas has no page");
-    if (padding < 0) return fail(ErrorCode::invalidInput, "the atlas' padding is {}", padding);
+    // As much as a side may have is what readers take.
+    if (const int most = Limits().maxImageSide; padding < 0 || padding > most)
+        return fail(ErrorCode::invalidInput, "the atlas' padding is {}; 0 to {} is expected",
+                    padding, most);
     if (layout != "grid" && layout != "tight")
         return fail(ErrorCode::invalidInput, "the atlas' layout is '{}'; grid or tight is expected",
                     layout);
-    STX_CHECK(checkPixels(*this));
+    STX_CHECK(checkOwnNumbers(*this));
     STX_CHECK(checkObjects(objects, views.size()));
     for (std::size_t i = 0; i < views.size(); ++i) {
         STX_CHECK(within(fmt::format("view {}", i), checkNumbers(views[i])));
     }
     for (const AtlasObject& o : objects)
-        STX_CHECK(within(fmt::format("object '{}'", o.name), checkPixels(o)));
+        STX_CHECK(within(fmt::format("object '{}'", o.name), checkOwnNumbers(o)));
     for (std::size_t i = 0; i < pages.size(); ++i) {
         const auto& p = pages[i];
         const auto same = [&](const auto& image) {

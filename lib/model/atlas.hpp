@@ -104,7 +104,8 @@ struct Atlas {
     /// view has pixels there. The atlas must pass check().
     [[nodiscard]] bool paddingHolds(int texels) const;
     /// Errors (invalidInput) when a rectangle leaves its view or page, two overlap, sizes disagree,
-    /// objects do not have all views, or a number, a depth or the layout is one that cannot be.
+    /// objects do not have all views, or a number (padding: 0 to 65535; the origin: finite), a
+    /// depth or the layout is one that cannot be.
     [[nodiscard]] Result<void> check() const;
 };
 

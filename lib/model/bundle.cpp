@@ -45,6 +45,13 @@ Result<void> checkNames(const std::vector<std::string_view>& names) {
     return {};
 }
 
+Result<void> checkOrigin(const glm::dvec3& origin) {
+    if (std::isfinite(origin.x) && std::isfinite(origin.y) && std::isfinite(origin.z)) return {};
+    return fail(ErrorCode::invalidInput,
+                "the origin is {:g}, {:g}, {:g}; finite numbers are expected", origin.x, origin.y,
+                origin.z);
+}
+
 Result<void> checkNumbers(const ViewHeader& view) {
     STX_CHECK(view.camera.check());
     if (!std::isfinite(view.nearPlane) || !std::isfinite(view.farPlane) || view.nearPlane < 0 ||
@@ -145,10 +152,12 @@ Result<void> checkViews(const std::vector<ReferenceView>& views, ViewCheck check
 }  // namespace
 
 Result<void> Bundle::check() const {
+    STX_CHECK(checkOrigin(origin));
     return checkViews(views, &ReferenceView::check);
 }
 
 Result<void> Bundle::checkHeaders() const {
+    STX_CHECK(checkOrigin(origin));
     return checkViews(views, &ReferenceView::checkHeader);
 }
 

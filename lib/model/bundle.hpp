@@ -36,7 +36,8 @@ struct Bundle {
     void noteMaterialLeftOut(Job& job) const;
     /// The bounds of all points, computed from the pixels.
     [[nodiscard]] Bounds computeBounds() const;
-    /// Each view's check(), with its index; at least one view; one colour space in all views.
+    /// Each view's check(), with its index; at least one view; one colour space in all views; an
+    /// origin that is finite.
     ///
     /// Who calls it: it looks at every pixel, so a pixel is checked once, by whoever brings it in.
     /// A reader returns only bundles that pass; openBundle() and saveBundle() rely on that. A

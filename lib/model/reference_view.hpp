@@ -81,7 +81,9 @@ struct ViewHeader {
     std::string name;  ///< becomes part and file names, which number what comes twice
     Camera camera;
 
-    double nearPlane = 10.0;  ///< scene units from the viewpoint; bounds the object
+    /// Scene units from the viewpoint; bounds the object. What writes depth as codes (8 or 16 bits:
+    /// MPEG-4, atlases in folders) clamps depth beyond the planes to them, with a note.
+    double nearPlane = 10.0;
     double farPlane = 100.0;
     /// How the depth is coded in MPEG-4 files: 8 or 16 bits; 32 = float distances, only in .exr.
     int depthBits = 16;

@@ -14,6 +14,9 @@ struct Atlas;
 /// Errors (invalidInput): a camera that fails check(), planes or depth bits that cannot be.
 [[nodiscard]] Result<void> checkNumbers(const ViewHeader& view);
 
+/// Errors (invalidInput): what a model's coordinates count from is not three finite numbers.
+[[nodiscard]] Result<void> checkOrigin(const glm::dvec3& origin);
+
 /// Pixels that are points. Errors (invalidInput): a depth that is NaN or below 0.
 [[nodiscard]] Result<std::int64_t> countPoints(const Image<float>& depth);
 

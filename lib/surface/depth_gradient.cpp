@@ -193,7 +193,12 @@ double creaseSlope(const Line& l, double noise, double without) {
     return paperSlope(l, without);
 }
 
-void link(const ReferenceView& view, double discontinuity, DepthSurface& surface) {
+/// Whether the work for a job, where there is one, is to stop.
+bool isStopped(const Job* job) {
+    return job && !job->checkCancelled();
+}
+
+void link(const ReferenceView& view, double discontinuity, DepthSurface& surface, const Job* job) {
     const auto& w = surface.w;
     const int width = w.width(), height = w.height();
     surface.links = Image<std::uint8_t>(width, height, 0);
@@ -225,6 +230,7 @@ void link(const ReferenceView& view, double discontinuity, DepthSurface& surface
         return before <= limit || after <= limit;
     };
     parallelFor(0, height, kRowsPerTask, [&](int y) {
+        if (isStopped(job)) return;
         for (int x = 0; x < width; ++x) {
             std::uint8_t bits = 0;
             if (linked(x, y, 1, 0)) bits |= DepthSurface::kRight;
@@ -236,13 +242,15 @@ void link(const ReferenceView& view, double discontinuity, DepthSurface& surface
 
 /// Takes the stairs of a coarse depth code away: plane fits, each result held to the distances that
 /// the code could have meant.
-void smoothWithinSteps(const ReferenceView& view, int radius, int rounds, DepthSurface& surface) {
+void smoothWithinSteps(const ReferenceView& view, int radius, int rounds, DepthSurface& surface,
+                       const Job* job) {
     const auto window = makeWindow(radius);
     const int width = surface.w.width(), height = surface.w.height();
     const double half = 0.5 * surface.step;
     Image<float> next = surface.w;
     for (int round = 0; round < rounds; ++round) {
         parallelFor(0, height, kRowsPerTask, [&](int y) {
+            if (isStopped(job)) return;
             for (int x = 0; x < width; ++x) {
                 Plane plane;
                 if (std::isnan(surface.w.at(x, y)) ||
@@ -288,7 +296,7 @@ std::optional<glm::vec2> slopeBeside(const DepthSurface& surface, const Image<st
 
 }  // namespace
 
-DepthSurface depthSurface(const ReferenceView& view, const BakeSettings& settings) {
+DepthSurface depthSurface(const ReferenceView& view, const BakeSettings& settings, const Job* job) {
     const Camera& camera = view.camera;
     const int width = view.depth.width(), height = view.depth.height();
     DepthSurface surface;
@@ -309,7 +317,7 @@ DepthSurface depthSurface(const ReferenceView& view, const BakeSettings& setting
     }
     const double meanZ = sumZ / static_cast<double>(points);
     surface.step = std::max(codedStep(view), kFloatStep * meanZ);
-    link(view, settings.discontinuity, surface);
+    link(view, settings.discontinuity, surface, job);
 
     const glm::dvec2 spacing = camera.sampleSpacing(meanZ);
     const double stairs = surface.step / std::max(spacing.x, spacing.y);
@@ -317,9 +325,10 @@ DepthSurface depthSurface(const ReferenceView& view, const BakeSettings& setting
     const bool coarse = robust && stairs > kCoarse;
     if (coarse)
         smoothWithinSteps(view, std::clamp(static_cast<int>(std::lround(2 + stairs)), 2, 8),
-                          stairs > kCoarser ? 4 : 2, surface);
+                          stairs > kCoarser ? 4 : 2, surface, job);
     const auto window = makeWindow(stairs > kCoarsest ? 3 : 2);
     parallelFor(0, height, kRowsPerTask, [&](int y) {
+        if (isStopped(job)) return;
         for (int x = 0; x < width; ++x) {
             const double w = surface.w.at(x, y);
             if (std::isnan(w)) continue;

@@ -5,6 +5,7 @@
 #include <glm/glm.hpp>
 
 #include "lib/base/image.hpp"
+#include "lib/base/job.hpp"
 #include "lib/model/reference_view.hpp"
 #include "lib/surface/normals.hpp"
 
@@ -32,8 +33,10 @@ struct DepthSurface {
 
 /// Links and gradients of a view. Pixels whose distances differ by more than `discontinuity` (share
 /// of the distance) beyond what the slope beside them explains are not linked. Pixels without links
-/// along an axis get the slope of a surface that faces the viewpoint.
-[[nodiscard]] DepthSurface depthSurface(const ReferenceView& view, const BakeSettings& settings);
+/// along an axis get the slope of a surface that faces the viewpoint. When `job`, where there is
+/// one, is cancelled, it ends early, and what it gives is of no use: who gives a job looks at it.
+[[nodiscard]] DepthSurface depthSurface(const ReferenceView& view, const BakeSettings& settings,
+                                        const Job* job = nullptr);
 
 /// Gives pixels that are linked with no other along an axis, at outlines mostly, the slope along it
 /// of the neighbour that comes nearest to their depth when it goes on straight, in place of that of

@@ -15,13 +15,17 @@ glm::dvec3 shortened(glm::dvec3 v, double longest) {
 }
 
 /// Writes the images of a view that have room: splat axes, and normals if asked for. With `was`
-/// only where the depth is another.
+/// only where the depth is another. Unfinished when `job`, where there is one, is cancelled.
 void writeVectors(ReferenceView& view, const BakeSettings& settings, bool normals,
-                  const Image<float>* was) {
+                  const Image<float>* was, const Job* job = nullptr) {
     const Camera& camera = view.camera;
-    DepthSurface surface = depthSurface(view, settings);
+    const auto stopped = [job] { return job && !job->checkCancelled(); };
+    DepthSurface surface = depthSurface(view, settings, job);
+    // Its links may be missing then.
+    if (stopped()) return;
     const auto ofEach = [&](const auto& write) {
         parallelFor(0, view.depth.height(), 16, [&](int y) {
+            if (stopped()) return;
             for (int x = 0; x < view.depth.width(); ++x) {
                 const double w = surface.w.at(x, y);
                 if (std::isnan(w) || (was && was->at(x, y) == view.depth.at(x, y))) continue;
@@ -40,7 +44,7 @@ void writeVectors(ReferenceView& view, const BakeSettings& settings, bool normal
         put(view.splatU, steps.alongX, kMaxSplatTilt * spacing.x);
         put(view.splatV, steps.alongY, kMaxSplatTilt * spacing.y);
     });
-    if (!normals) return;
+    if (!normals || stopped()) return;
     // Splats cover what is seen of them: at outlines those that face the viewpoint do.
     continueSlopes(camera, surface);
     ofEach([&](int x, int y, double w, glm::dvec2 gradient) {
@@ -49,7 +53,7 @@ void writeVectors(ReferenceView& view, const BakeSettings& settings, bool normal
     });
 }
 
-void bakeView(ReferenceView& view, const BakeSettings& settings) {
+Result<void> bakeView(ReferenceView& view, const BakeSettings& settings, const Job& job) {
     const bool makeNormals = !(settings.keepNormals && view.hasNormals());
     const auto room = [&] {
         return Image<glm::vec3>(view.depth.width(), view.depth.height(), glm::vec3(0));
@@ -57,7 +61,8 @@ void bakeView(ReferenceView& view, const BakeSettings& settings) {
     if (makeNormals) view.normal = room();
     view.splatU = room();
     view.splatV = room();
-    writeVectors(view, settings, makeNormals, nullptr);
+    writeVectors(view, settings, makeNormals, nullptr, &job);
+    return job.checkCancelled();
 }
 
 /// Zero where a depth was and none is.
@@ -83,9 +88,8 @@ Result<ViewChange> bakeOfViews(const BakeSettings& settings, const PeakMemory& t
                     "the depth discontinuity is {:g}; it must be over 0 and at most 1",
                     settings.discontinuity);
     ViewChange change;
-    change.change = [settings](ReferenceView& view, Job&) -> Result<void> {
-        bakeView(view, settings);
-        return {};
+    change.change = [settings](ReferenceView& view, Job& job) {
+        return bakeView(view, settings, job);
     };
     change.kinds = [](ViewImageKinds& kinds) { kinds.normal = kinds.splatU = kinds.splatV = true; };
     change.takes = takes;
@@ -100,7 +104,7 @@ Result<void> bake(Bundle& bundle, const BakeSettings& settings, Job& job) {
     const auto count = static_cast<std::int64_t>(bundle.views.size());
     for (std::int64_t i = 0; i < count; ++i) {
         STX_CHECK(job.checkCancelled());
-        bakeView(bundle.views[i], settings);
+        STX_CHECK(bakeView(bundle.views[i], settings, job));
         job.progress(i + 1, count, "baking normals and splats");
     }
     return {};

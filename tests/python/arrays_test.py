@@ -89,6 +89,11 @@ class Arrays(Case):
         self.assertEqual(stx.View(colours, depth, camera, no_depth="unknown").colour[0, 0, 3], 255)
         linear = stx.View(colours.astype(np.float32) / 255, depth, camera)
         self.assertEqual(linear.colour.dtype, np.float32)
+        # Of any order of bytes, and of any size.
+        for kind in (">f4", ">f8", np.float16, np.longdouble):
+            np.testing.assert_array_equal(stx.View(colours, depth.astype(kind), camera).depth, straight.depth)
+        turned = stx.View((colours.astype(np.float32) / 255).astype(">f4"), depth, camera)
+        np.testing.assert_array_equal(turned.colour, linear.colour)
 
     def test_atlases_and_meshes(self):
         mesh = stx.open(MODEL)

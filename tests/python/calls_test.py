@@ -8,7 +8,7 @@ import threading
 import unittest
 import warnings
 
-from harness import MODEL, Case, np, plate, stx
+from harness import MODEL, Case, np, plate, run, stx
 
 # Minutes of work on any machine, which reports its progress often.
 LONG = {"views": "sphere:200", "size": (1024, 1024), "supersampling": 8}
@@ -26,6 +26,16 @@ except KeyboardInterrupt:
     print("stopped")
 stx.convert({MODEL!r}, views="ring:2", size=(32, 32))
 print("works on")
+"""
+# Ends while another thread works.
+LEFT = f"""
+import threading, stx
+begun = threading.Event()
+def work():
+    stx.convert({MODEL!r}, **{LONG!r}, job=stx.Job(progress=lambda *_: begun.set()))
+threading.Thread(target=work, daemon=True).start()
+begun.wait()
+print("left")
 """
 
 
@@ -256,6 +266,47 @@ class Calls(Case):
             child.kill()
         self.assertEqual((out, child.returncode), ("stopped\nworks on\n", 0))
 
+    def test_a_process_ends_while_a_thread_works(self):
+        done = subprocess.run([sys.executable, "-c", LEFT], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=300)
+        self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "left\n", ""))
+
+    def test_progress_hears_the_end(self):
+        heard = []
+        bundle = stx.convert(self.mesh, views="ring:3", size=(64, 64), job=stx.Job())
+        stx.bake(bundle, job=stx.Job(progress=lambda *news: heard.append(news)))
+        self.assertEqual(heard[-1], (3, 3, "baking normals and splats"))
+
+        def progress(done, total, what):
+            if done == total:
+                raise KeyError(what)
+        with self.assertRaises(KeyError):
+            stx.bake(bundle, job=stx.Job(progress=progress))
+
+    def test_names_of_any_bytes_are_shown(self):
+        name = os.fsdecode(b"caf\xe9.obj")
+        with open(name, "wb") as file:
+            file.write(b"mtllib T\xfcre.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        note = "material file 'T\\xfcre.mtl' cannot be read; its materials have no colour"
+        job = stx.Job()
+        mesh = stx.open(name, job=job)
+        self.assertIn(note, job.notes)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            stx.open(name)
+        self.assertIn(note, [str(warning.message) for warning in caught])
+        self.assertEqual(mesh.title, "caf\\xe9")
+        bundle = stx.convert(mesh, views="ring:2", size=(16, 16), job=job)
+        self.assertEqual((bundle.title, repr(bundle)), ("caf\\xe9", "<stx.Bundle 'caf\\xe9', 2 views>"))
+        self.fails("io", "none\\xfe.obj", stx.open, os.fsdecode(b"none\xfe.obj"))
+
+    def test_views_without_a_name_get_one_that_is_free(self):
+        camera = stx.Camera((6, 4), 5)
+        pixels, depth = np.zeros((4, 6, 3), np.uint8), np.ones((4, 6), np.float32)
+        named, unnamed = stx.View(pixels, depth, camera, name="view001"), stx.View(pixels, depth, camera)
+        for views, names in (([unnamed, unnamed], ["view000", "view001"]), ([named, unnamed], ["view001", "view002"]),
+                             ([unnamed, unnamed, named], ["view000", "view002", "view001"])):
+            self.assertEqual([view.name for view in stx.Bundle(views).views], names)
+
     def test_threads_of_python_draw_together(self):
         bundle = stx.convert(MODEL, views="ring:4", size=(64, 64))
         path = stx.orbit(bundle, 4, size=(48, 48))
@@ -309,6 +360,21 @@ class Calls(Case):
         self.assertEqual(stx.render(bundle, camera, environment=False).alpha[0, 0], 0)
         self.fails("io", "none.png", stx.render, bundle, camera, environment="none.png")
         self.assertEqual(os.listdir(), ["sky.png"])
+
+    def test_a_bundle_of_the_views_of_another_keeps_its_environment(self):
+        sky = np.zeros((8, 16, 3), np.uint8)
+        sky[:] = (10, 200, 30)
+        # Any picture twice as wide as high will do.
+        stx.render(stx.Bundle([stx.View(sky, np.ones((8, 16)), stx.Camera((16, 8), 8))]), stx.Camera((16, 8), 8)).save("sky.png")
+        run("convert", MODEL, "-o", "around.exr", "--views", "ring:2", "--size", "32x32", "--environment", "sky.png")
+        around = stx.open("around.exr")
+        camera = around.views[0].camera
+        depth = np.full((32, 32), np.inf)
+        depth[3, 3] = 1
+        fresh = stx.View(np.zeros((32, 32, 3), np.uint8), depth, camera)
+        for views in (around.views, [fresh, around.views[1]]):
+            self.assertEqual(stx.render(stx.Bundle(views, origin=around.origin), camera).alpha.min(), 1)
+        self.assertEqual(stx.render(stx.Bundle(around.views), camera, environment=False).alpha.min(), 0)
 
 
 if __name__ == "__main__":

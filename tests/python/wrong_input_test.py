@@ -230,6 +230,8 @@ class WrongInput(Case):
         self.fails("usage", "mask is float64", stx.compare, a, a, mask=np.ones((8, 8)))
         self.fails("invalidInput", "", stx.compare, a, a, mask=np.zeros((8, 8), bool))
         self.fails("usage", "background is 2; values of 0 to 1", stx.compare, a, a, background=2)
+        large = np.zeros((2000, 2000, 3), np.uint8)
+        self.fails("invalidInput", "more than the memory limit of 64 MiB", stx.compare, large, large, job=stx.Job(max_memory=64))
 
 
 if __name__ == "__main__":

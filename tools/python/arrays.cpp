@@ -42,12 +42,25 @@ py::array imageFrom(py::handle value, const char* name, bool fits, const char* e
     return array;
 }
 
-bool isImage(py::handle value, std::initializer_list<const char*> types,
+/// A kind of numpy's numbers, of some sizes in bytes. Their order of bytes does not matter.
+struct ElementType {
+    char kind;
+    std::initializer_list<py::ssize_t> sizes;
+};
+constexpr ElementType kBools{'b', {1}}, kCodes{'u', {1}}, kFloat32{'f', {4}};
+// float16, float32, float64, and longdouble, which takes 12 or 16 with what fills it up.
+constexpr ElementType kFloats{'f', {2, 4, 8, 12, 16}};
+
+bool isImage(py::handle value, std::initializer_list<ElementType> types,
              std::initializer_list<py::ssize_t> channels) {
     if (!py::isinstance<py::array>(value)) return false;
     const auto array = py::reinterpret_borrow<py::array>(value);
-    const std::string type = py::str(array.dtype());
-    if (std::ranges::find(types, type) == types.end()) return false;
+    const py::dtype type = array.dtype();
+    const bool known = std::ranges::any_of(types, [&](const ElementType& wanted) {
+        return type.kind() == wanted.kind &&
+               std::ranges::find(wanted.sizes, type.itemsize()) != wanted.sizes.end();
+    });
+    if (!known) return false;
     const py::ssize_t depth = array.ndim() == 3 ? array.shape(2) : 0;
     return (array.ndim() == 2 || array.ndim() == 3) &&
            std::ranges::find(channels, depth) != channels.end();
@@ -165,7 +178,7 @@ glm::ivec2 sizeFrom(py::handle value, const char* name) {
 
 Texture textureFrom(py::handle value, const char* name, bool* hasAlpha) {
     const auto array =
-        imageFrom(value, name, isImage(value, {"uint8", "float32"}, {3, 4}),
+        imageFrom(value, name, isImage(value, {kCodes, kFloat32}, {3, 4}),
                   "an array of uint8 (sRGB) or float32 (linear light) and of shape (height, width, "
                   "3 or 4)");
     if (hasAlpha) *hasAlpha = array.shape(2) == 4;
@@ -181,14 +194,13 @@ Texture textureFrom(py::handle value, const char* name, bool* hasAlpha) {
 
 Image<float> depthFrom(py::handle value, const char* name) {
     return copied<float>(imageFrom(
-        value, name, isImage(value, {"float16", "float32", "float64"}, {0}),
+        value, name, isImage(value, {kFloats}, {0}),
         "an array of floats (distances in scene units, infinite or 0 where there is none) "
         "and of shape (height, width)"));
 }
 
 Image<glm::vec3> vectorsFrom(py::handle value, const char* name) {
-    auto image = copied<glm::vec3>(imageFrom(value, name,
-                                             isImage(value, {"float16", "float32", "float64"}, {3}),
+    auto image = copied<glm::vec3>(imageFrom(value, name, isImage(value, {kFloats}, {3}),
                                              "an array of floats and of shape (height, width, 3)"));
     if (!std::ranges::all_of(image.pixels(), [](glm::vec3 v) {
             return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -198,7 +210,7 @@ Image<glm::vec3> vectorsFrom(py::handle value, const char* name) {
 }
 
 Image<std::uint8_t> maskFrom(py::handle value, const char* name) {
-    const auto array = imageFrom(value, name, isImage(value, {"bool", "uint8"}, {0}),
+    const auto array = imageFrom(value, name, isImage(value, {kBools, kCodes}, {0}),
                                  "an array of bool or uint8 and of shape (height, width)");
     auto mask = copied<std::uint8_t>(array);
     if (array.dtype().kind() == 'b')

@@ -13,11 +13,12 @@
 namespace stx::python {
 namespace {
 
-/// A view, and what the camera counts from, where that is known: of one that was taken from a
-/// model.
+/// A view. Of one that was taken from a model also what the camera counts from, and what stands
+/// behind all views of the model (null: nothing).
 struct HeldView {
     std::shared_ptr<const ReferenceView> view;
     std::optional<glm::dvec3> origin;
+    std::shared_ptr<const Environment> environment;
 };
 
 /// A part of a model that keeps the model. pybind11 knows no const; nothing here changes it.
@@ -94,7 +95,23 @@ HeldView makeView(const py::object& colour, const py::object& depth, const Camer
     if (made->hasNormals()) checkNormals(*made);
     if (!hasAlpha && made->noDepth == NoDepth::empty) clearBackground(*made);
     bleedColour(made->texture);
-    return {std::move(made), {}};
+    return {std::move(made), {}, {}};
+}
+
+/// Names that were given are unique; views without one get that of their number, or the next one
+/// that is free.
+void nameViews(std::vector<ReferenceView>& views) {
+    std::set<std::string> names;
+    for (const ReferenceView& view : views)
+        if (!view.name.empty() && !names.insert(view.name).second)
+            refuse("two views have the name '{}'; names are unique in a bundle", view.name);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        if (!views[i].name.empty()) continue;
+        std::size_t number = i;
+        do {
+            views[i].name = fmt::format("view{:03}", number++);
+        } while (!names.insert(views[i].name).second);
+    }
 }
 
 py::object makeBundle(const std::vector<HeldView>& views, std::string title,
@@ -107,15 +124,12 @@ py::object makeBundle(const std::vector<HeldView>& views, std::string title,
                placed != views.end()) {
         bundle.origin = *placed->origin;
     }
-    std::set<std::string> names;
     for (const HeldView& held : views) {
         bundle.views.push_back(*held.view);
         bundle.views.back().camera.position += held.origin.value_or(bundle.origin) - bundle.origin;
-        std::string& name = bundle.views.back().name;
-        if (name.empty()) name = fmt::format("view{:03}", bundle.views.size() - 1);
-        if (!names.insert(name).second)
-            refuse("two views have the name '{}'; names are unique in a bundle", name);
+        if (!bundle.environment) bundle.environment = held.environment;
     }
+    nameViews(bundle.views);
     bundle.title = std::move(title);
     valueOf(bundle.check());
     return modelObject(std::move(bundle));
@@ -125,7 +139,8 @@ template <class M>
 py::list viewsOf(const M& model) {
     py::list views;
     for (const ReferenceView& view : model.get().views)
-        views.append(HeldView{{model.model, &view}, originOf(*model.model)});
+        views.append(
+            HeldView{{model.model, &view}, originOf(*model.model), model.get().environment});
     return views;
 }
 
@@ -158,7 +173,7 @@ void bindView(py::module_& module) {
 colour: (height, width, 3 or 4), uint8 (sRGB) or float32 (linear light), straight alpha. depth:
 (height, width) floats, scene units to the plane through the viewpoint (not along the ray), infinite
 or 0 where there is none. Both are as large as the camera's picture; they are copied. name: unique in its
-bundle (view000, ...). depth_bits: 8, 16 or 32 (floats, which only .exr holds): depth is rounded to what
+bundle (view000, ..., or the next that is free). depth_bits: 8, 16 or 32 (floats, which only .exr holds): depth is rounded to what
 files hold. no_depth: what pixels without a depth are: 'empty' (nothing is there) or 'unknown' (not
 measured). normals: (height, width, 3), unit (within 0.05), world axes; 0 where there is none. Raises stx.Error (usage, invalidInput).)")
         .def(py::init(&makeView), py::arg("colour"), py::arg("depth"), py::arg("camera"),
@@ -180,7 +195,9 @@ measured). normals: (height, width, 3), unit (within 0.05), world axes; 0 where 
                                "(height, width, 2) float32, 0..1, or None.")
         .def_property_readonly("emissive", ofView(&V::emissive),
                                "(height, width, 3) float32, linear light, or None.")
-        .def_property_readonly("name", valueOfView(&V::name), "Unique in its bundle.")
+        .def_property_readonly(
+            "name", [](const HeldView& v) { return textFrom(v.view->name); },
+            "Unique in its bundle. Bytes of a file's that are not UTF-8 are \\xff here.")
         .def_property_readonly("camera", valueOfView(&V::camera), "The camera that saw it.")
         .def_property_readonly("near_plane", valueOfView(&V::nearPlane),
                                "Least distance of its depth, scene units.")
@@ -194,7 +211,8 @@ measured). normals: (height, width, 3), unit (within 0.05), world axes; 0 where 
             "'empty' or 'unknown'.")
         .def("__repr__", [](const HeldView& v) {
             const Camera& camera = v.view->camera;
-            return fmt::format("<stx.View '{}' {}x{}>", v.view->name, camera.width, camera.height);
+            return textFrom(
+                fmt::format("<stx.View '{}' {}x{}>", v.view->name, camera.width, camera.height));
         });
 }
 
@@ -226,8 +244,9 @@ void bindBundle(py::module_& module) {
 
 views: at least one stx.View, all of one kind of colour. title: of the file. origin: (3,), what cameras
 and positions count from; None: what those of the first view that was taken from a model count from, else 0.
-Views that were taken from models of other origins are moved to it. The arrays of its views are
-read-only and show its memory; they keep it alive.)");
+Views that were taken from models of other origins are moved to it. What is shown behind everything is that
+of the first view that was taken from a model which has it. The arrays of its views are read-only and show its
+memory; they keep it alive.)");
     bindSave<BundleModel>(
         type,
         R"(Writes it, whole or not at all, by the ending: .exr (exact, but for colours under alpha 0,
@@ -249,7 +268,8 @@ is an error. Raises stx.Error (usage, invalidInput, io).)");
             "Of a frame of a film: how long it is shown, seconds; or None.")
         .def("__len__", [](const BundleModel& b) { return b.get().views.size(); })
         .def("__repr__", [](const BundleModel& b) {
-            return fmt::format("<stx.Bundle '{}', {} views>", b.get().title, b.get().views.size());
+            return textFrom(
+                fmt::format("<stx.Bundle '{}', {} views>", b.get().title, b.get().views.size()));
         });
 }
 
@@ -322,11 +342,13 @@ void bindModels(py::module_& module) {
         .def_property_readonly(
             "title",
             [](const AnyModel& m) {
-                if (const auto* bundle = std::get_if<Bundle>(&*m.model)) return bundle->title;
-                if (const auto* atlas = std::get_if<Atlas>(&*m.model)) return atlas->title;
-                return m.title;
+                if (const auto* bundle = std::get_if<Bundle>(&*m.model))
+                    return textFrom(bundle->title);
+                if (const auto* atlas = std::get_if<Atlas>(&*m.model))
+                    return textFrom(atlas->title);
+                return textFrom(m.title);
             },
-            "Of the file, or of a mesh its file's name.")
+            "Of the file, or of a mesh its file's name. Bytes that are not UTF-8 are \\xff here.")
         .def_property_readonly(
             "bounds", [](const AnyModel& m) { return boundsArray(boundsOf(*m.model)); },
             "(2, 3) float64: least and greatest corner, scene units; None where nothing is.")

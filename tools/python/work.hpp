@@ -5,6 +5,7 @@
 #include <future>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <pybind11/pybind11.h>
@@ -24,6 +25,10 @@ struct JobHandle {
     py::object progress = py::none();
     std::vector<std::string> notes;
 };
+
+/// Text of the library, where names of files may have any bytes: those that are not UTF-8 become
+/// `\xff`, as the program shows them.
+[[nodiscard]] py::str textFrom(std::string_view text);
 
 /// Throws an error as stx.Error.
 [[noreturn]] void raise(const Error& error);

@@ -301,6 +301,7 @@ class SequenceWriter {
         const DepthCode code{node.get<float>("nearPlane"), node.get<float>("farPlane"),
                              (1u << bits) - 1};
         STX_TRY(images.depth, depthPlane(view.depth, code, images.padding, images.worstDepth));
+        images.depthClamped = isBeyondPlanes(images.worstDepth, code);
         bool clamped = false;
         const Rgba8Image colour = rgba8FromTexture(view.texture, clamped);
         images.linear = view.texture.isLinear();
@@ -326,6 +327,8 @@ class SequenceWriter {
         if (asVideo()) {
             loss_.linear = loss_.linear || images.linear;
             loss_.clamped = loss_.clamped || images.clamped;
+            if (images.depthClamped)
+                loss_.worstClamped = std::max(loss_.worstClamped, images.worstDepth);
             track.coverageLost = track.coverageLost || images.coverageLost;
         } else {
             const auto k = static_cast<std::size_t>(&track - tracks_.data());

@@ -11,6 +11,9 @@
 namespace stx::mpeg4 {
 namespace {
 
+/// By how much floats may be off, as a share of a distance: it is not worth a word.
+constexpr double kFloatsOff = 1e-6;
+
 /// The nearest float that is not above (below) a value: planes must keep what lies between them.
 float floatBelow(double v) {
     const float f = static_cast<float>(v);
@@ -21,6 +24,11 @@ float floatAbove(double v) {
     const float f = static_cast<float>(v);
     return static_cast<double>(f) < v ? std::nextafter(f, std::numeric_limits<float>::infinity())
                                       : f;
+}
+
+/// That of pictures of these bits, 8 or 16, by the planes that are written.
+DepthCode writtenCodeOf(const ViewImages& images, int bits) {
+    return {images.nearPlane, images.farPlane, bits == 8 ? 255u : 65535u};
 }
 
 }  // namespace
@@ -70,9 +78,13 @@ float longestSplatOf(const ReferenceView& view) {
     return longest > 0 ? longest : 1.0f;
 }
 
+bool isBeyondPlanes(double worstDepth, const DepthCode& code) {
+    return worstDepth > 0.5 * code.step() + kFloatsOff * code.farPlane;
+}
+
 void DepthLoss::add(const ViewHeader& view, int bits, double worstDepth, double ownStep) {
-    // Depth that is on the codes already is off by what floats are, which is not worth a word.
-    const double floats = 1e-6 * view.farPlane;
+    // Of depth that is on the codes already.
+    const double floats = kFloatsOff * view.farPlane;
     const double rounding = std::max(0.01 * view.depthCode().step(), floats);
     if (view.depthBits != 32 && bits >= view.depthBits && !(bits == 8 && worstDepth > rounding) &&
         worstDepth <= 0.5 * ownStep + floats)
@@ -96,7 +108,13 @@ void DepthLoss::note(Job& job) const {
 void PictureLoss::add(std::size_t i, const ViewHeader& view, int bits, const ViewImages& images) {
     const double step = i < ownSteps.size() ? ownSteps[i] : view.depthCode().step();
     if (depth.size() <= i) depth.resize(i + 1);
-    depth[i].add(view, bits, images.worstDepth, step);
+    double worst = images.worstDepth;
+    if (images.depthClamped) {
+        worstClamped = std::max(worstClamped, worst);
+        // How far off the rest is was not looked at.
+        worst = 0.5 * writtenCodeOf(images, bits).step();
+    }
+    depth[i].add(view, bits, worst, step);
     linear = linear || images.linear;
     clamped = clamped || images.clamped;
     coverage = coverage || images.coverageLost;
@@ -106,6 +124,11 @@ void PictureLoss::note(const SceneWriteOptions& options, Job& job) const {
     DepthLoss ofAll;
     for (const DepthLoss& ofView : depth) ofAll.add(ofView);
     ofAll.note(job);
+    if (worstClamped > 0)
+        job.note(
+            fmt::format("depth beyond nearPlane or farPlane was clamped to them: at most "
+                        "{:.4g} scene units off",
+                        worstClamped));
     Rgba8Loss{.linear = linear, .clipped = clamped}.note(job);
     if (options.texture == SceneWriteOptions::Texture::jpeg && !options.pointTexture)
         job.note(fmt::format("colour is JPEG of quality {}, which is lossy", options.jpegQuality));
@@ -124,8 +147,7 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
         return fail(ErrorCode::unsupported,
                     "nearPlane {:g} and farPlane {:g} do not fit 32-bit floats", view.nearPlane,
                     view.farPlane);
-    const DepthCode code{out.nearPlane, out.farPlane,
-                         writtenDepthBits(view, options) == 8 ? 255u : 65535u};
+    const DepthCode code = writtenCodeOf(out, writtenDepthBits(view, options));
     const bool mayBeUnknown = view.depthMayBeUnknown();
     STX_CHECK(view.texture.check());
     out.linear = view.texture.isLinear();
@@ -136,6 +158,7 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
                 out.worstDepth =
                     std::max(out.worstDepth, std::abs(code.decode(code.encode(d)) - d));
         }
+        out.depthClamped = isBeyondPlanes(out.worstDepth, code);
         const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
         out.coverageLost = !alphaFollowsDepth(colour, view.depth, mayBeUnknown);
         if (mayBeUnknown) STX_SET(out.unknown, unknownMask(colour, view.depth));
@@ -146,6 +169,7 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
         return out;
     }
     STX_TRY(out.depth, depthPng(view.depth, code, out.padding, out.worstDepth));
+    out.depthClamped = isBeyondPlanes(out.worstDepth, code);
     // Copies of large pictures would be half of the memory of writing.
     const Rgba8Image* own = view.texture.rgba8();
     Rgba8Image coded;

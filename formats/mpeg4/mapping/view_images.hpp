@@ -15,20 +15,26 @@ struct ViewImages {
     float nearPlane = 0, farPlane = 0;
     float longestSplat = 0;  ///< scene units; splatMinMax is (-longestSplat, longestSplat)
     Bytes texture, depth, normal, splatU, splatV;  ///< files; empty where the view has none
-    std::string unknown;    ///< where its depth is unknown, if that can be: what its note says
-    double worstDepth = 0;  ///< largest error of the depth's code, scene units
-    bool linear = false;    ///< colour was, and is 8-bit sRGB now
-    bool clamped = false;   ///< linear colour above 1 was cut
+    std::string unknown;        ///< where its depth is unknown, if that can be: what its note says
+    double worstDepth = 0;      ///< largest error of the depth's code, scene units
+    bool depthClamped = false;  ///< some depth lay beyond the planes: that is the error then
+    bool linear = false;        ///< colour was, and is 8-bit sRGB now
+    bool clamped = false;       ///< linear colour above 1 was cut
     bool unmeasuredLost = false;  ///< colours without a depth
     bool coverageLost = false;
     /// Of planes of video, which have no alpha, where coverage is lost: a hash of it; else 0.
     std::size_t coverage = 0;
 };
 
+/// Whether depth that a code has with this error at most, scene units, lay beyond its planes:
+/// rounding makes half a step, and floats a little.
+[[nodiscard]] bool isBeyondPlanes(double worstDepth, const DepthCode& code);
+
 /// The largest error of depth that is rounded to codes, for a note.
 class DepthLoss {
   public:
-    /// Of a view whose depth is written in `bits`, with ViewImages::worstDepth. `ownStep`: scene
+    /// Of a view whose depth is written in `bits`, with ViewImages::worstDepth of what lay between
+    /// the planes. `ownStep`: scene
     /// units between codes of its bits and its own planes; where a film has one range for all
     /// frames, depth may be further off than half of it.
     void add(const ViewHeader& view, int bits, double worstDepth, double ownStep);
@@ -45,6 +51,8 @@ class DepthLoss {
 /// What pictures of MPEG-4 lose of the views that are added, for notes.
 struct PictureLoss {
     std::vector<DepthLoss> depth;  ///< of each view
+    /// Of depth beyond the planes; 0: there was none.
+    double worstClamped = 0;
     bool linear = false, clamped = false, coverage = false;
     /// DepthLoss::add()'s of each view, where the views have the range of a film; else empty.
     std::vector<double> ownSteps;

@@ -141,6 +141,26 @@ TEST(Compare, WhatTheMaskLeavesOutMayBeNoNumber) {
     EXPECT_FALSE(compare(bad, b));
 }
 
+TEST(Compare, ABackgroundThatIsNoColourIsRefused) {
+    const Picture a(8, 8, {200, 0, 0, 0}), b(8, 8, {0, 0, 0, 255});
+    CompareSettings settings;
+    settings.background.g = std::numeric_limits<float>::quiet_NaN();
+    const auto refused = compare(a, b, settings);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::usage);
+    EXPECT_FALSE(errorPicture(a, b, settings));
+}
+
+TEST(Compare, StopsWithItsJob) {
+    const Picture a(8, 8, {200, 0, 0, 255}), b(8, 8, {0, 0, 0, 255});
+    Job job;
+    EXPECT_TRUE(compare(a, b, {}, &job));
+    job.cancelled = true;
+    const auto stopped = compare(a, b, {}, &job);
+    ASSERT_FALSE(stopped);
+    EXPECT_EQ(stopped.error().code, ErrorCode::failed);
+}
+
 TEST(Compare, SizesMustMatch) {
     EXPECT_FALSE(compare(Picture(4, 4), Picture(4, 5)));
     EXPECT_FALSE(compare(Picture(), Picture()));

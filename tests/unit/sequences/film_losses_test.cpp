@@ -143,6 +143,38 @@ TEST(FilmLosses, DepthThatTheFilmsRangeRoundsIsNoted) {
     EXPECT_GE(off, 0.9 * 0.5 * 9999 / 65534);
 }
 
+TEST(FilmLosses, DepthBeyondThePlanesIsClampedAndNotRounded) {
+    // Of a single frame, of pictures of a film, and of its video.
+    struct Way {
+        int count;
+        int h264;
+        bool points;
+    };
+    for (const Way way :
+         {Way{1, -1, false}, Way{1, -1, true}, Way{3, -1, false}, Way{3, 20, false}}) {
+        ChangedViews frames(
+            [&](ReferenceView& view, std::size_t i) {
+                if (i + 1 == static_cast<std::size_t>(way.count))
+                    view.depth.at(3, 3) = static_cast<float>(view.farPlane + 40);
+            },
+            way.count);
+        TemporaryFolder folder("beyond_planes");
+        SaveOptions options;
+        options.h264 = way.h264;
+        options.pointTexture = way.points;
+        Job job;
+        const auto saved = saveSequence(frames, folder / "a.mp4", options, job);
+        if (!saved && saved.error().code == ErrorCode::unsupported) continue;  // no video here
+        ASSERT_TRUE(saved) << saved.error().text();
+        const auto notes = job.takeNotes();
+        EXPECT_TRUE(anyHas(notes,
+                           "depth beyond nearPlane or farPlane was clamped to them: at most 40 "
+                           "scene units off"))
+            << fmt::format("{}", fmt::join(notes, "\n"));
+        EXPECT_FALSE(anyHas(notes, "depth is rounded"));
+    }
+}
+
 TEST(FilmLosses, AFrameWithoutAPointHasNoPartInTheDepthRange) {
     for (const std::size_t empty : {0u, 1u, 3u}) {
         TemporaryFolder folder("empty_frames");

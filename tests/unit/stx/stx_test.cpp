@@ -245,6 +245,27 @@ TEST(Stx, SettingsOfFilesOutOfRangeAreRefused) {
     sky.skyColours = {glm::vec3(1)};
     EXPECT_FALSE(asCube(sky, 0, {}));
     EXPECT_FALSE(asEquirectangular(sky, 4, 0, {}));
+    const auto messageOf = [](const Result<void>& saved) {
+        if (saved) return std::string("none");
+        EXPECT_EQ(saved.error().code, ErrorCode::usage);
+        return saved.error().text();
+    };
+    for (const char* name : {"sky.jpg", "sky.mp4", "sky"})
+        EXPECT_EQ(messageOf(saveEnvironment(sky, folder.path() / name, {.jpegQuality = 200}, job)),
+                  "the quality of JPEG is 200; 1 to 100, or 0 (PNG), is expected");
+    const auto frame = render(Model(bundle), bundle.views[0].camera, {}, job);
+    ASSERT_TRUE(frame);
+    for (const int quality : {0, 101}) {
+        PictureOptions options;
+        options.jpegQuality = quality;
+        EXPECT_EQ(messageOf(save(*frame, folder.path() / "a.jpg", options, job)),
+                  fmt::format("the quality of JPEG is {}; 1 to 100 is expected", quality));
+    }
+    PictureOptions options;
+    options.background = glm::vec3(2, -1, NAN);
+    EXPECT_EQ(messageOf(save(*frame, folder.path() / "a.png", options, job)),
+              "the background is 2, -1, nan; values of 0 to 1 are expected");
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
 TEST(Stx, NotesWhatDepthInEightBitsCosts) {

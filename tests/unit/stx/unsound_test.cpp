@@ -34,6 +34,10 @@ TEST(Unsound, AtlasesAreRefused) {
     check([](Atlas& a) { a.sourcePixels = -9; },
           fmt::format("sourcePixels is -9 and keptPixels {}; 0 or more are expected",
                       sound->keptPixels));
+    check([](Atlas& a) { a.padding = 100000; },
+          "the atlas' padding is 100000; 0 to 65535 is expected");
+    check([](Atlas& a) { a.origin.x = std::nan(""); },
+          "the origin is nan, 0, 0; finite numbers are expected");
     check([](Atlas& a) { a.pages[0].depth.at(5, 5) = -3; },
           "page 0: depth holds -3; distances are 0 or more");
     check([](Atlas& a) { a.pages[0].depth.at(5, 5) = std::nanf(""); },
@@ -56,6 +60,10 @@ TEST(Unsound, BundlesAreRefused) {
         EXPECT_EQ(refusal(bundle, name),
                   "view 0: it has splatU without splatV; both axes of the splats, or none, are "
                   "expected");
+    bundle = smallBundle(2, 16, true, false);
+    bundle.origin.z = std::numeric_limits<double>::infinity();
+    for (const char* name : {"a.mp4", "a.exr"})
+        EXPECT_EQ(refusal(bundle, name), "the origin is 0, 0, inf; finite numbers are expected");
 }
 
 TEST(Unsound, CamerasBeyondFloatsAreRefusedInMpegFour) {

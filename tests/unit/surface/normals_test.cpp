@@ -294,6 +294,20 @@ TEST(Normals, SameOnAnyNumberOfThreads) {
     EXPECT_EQ(one.views[0].splatV, many.views[0].splatV);
 }
 
+TEST(Normals, OfOneViewStopWithTheJob) {
+    Bundle bundle;
+    bundle.views.push_back(
+        analytic::capture(analytic::sphere, analytic::lookingAt({0, 0, 3}, 8), 16));
+    const auto change = bakeOfViews({});
+    ASSERT_TRUE(change);
+    Job job;
+    EXPECT_TRUE(change->change(bundle.views[0], job));
+    job.cancelled = true;
+    const auto stopped = change->change(bundle.views[0], job);
+    ASSERT_FALSE(stopped);
+    EXPECT_EQ(stopped.error().code, ErrorCode::failed);
+}
+
 TEST(Normals, RefusesNonsense) {
     Bundle bundle;
     Job job;

@@ -11,7 +11,7 @@ centre is (0.5, 0.5); depth is planar, the distance to the plane through the vie
 Arrays that objects give show their memory: they are read-only and keep it alive.
 
 Calls raise stx.Error, give notes as warnings of kind stx.Note (or to their job), let other threads of Python work,
-and stop within a second when Ctrl-C is pressed.
+and stop within a second when Ctrl-C is pressed; what writes .mp4, .xmt or .bt, with the view that it writes.
 """
 from __future__ import annotations
 
@@ -296,8 +296,9 @@ def _draw_film(film: Film, cameras: list[Camera], moments: list[float], drawing:
         yield renderer.render(camera, None, job)
 
 
-def compare(a: Path | Frame | ArrayLike, b: Path | Frame | ArrayLike, *, mask: ArrayLike | None = None,
-            background: ArrayLike = 0.0, job: Job | None = None) -> Comparison:
+def compare(a: Path | Frame | NDArray[np.uint8] | NDArray[np.float32], b: Path | Frame | NDArray[np.uint8] | NDArray[np.float32],
+            *, mask: NDArray[np.bool_] | NDArray[np.uint8] | None = None, background: ArrayLike = 0.0,
+            job: Job | None = None) -> Comparison:
     """PSNR, SSIM and the worst pixel of two pictures of one size.
 
     a, b: a file, a Frame (as its PNG), or (height, width, 3 or 4) uint8 (sRGB) or float32 (linear light), straight

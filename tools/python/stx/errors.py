@@ -53,7 +53,7 @@ class Note(UserWarning):
     """
 
 
-def warn(notes: list[str]) -> None:
+def warn(notes: tuple[str, ...]) -> None:
     """Gives notes as warnings about the line that called stx."""
     level, frame = 1, sys._getframe()
     while frame.f_back and frame.f_globals.get("__package__") == __package__:
