@@ -3,6 +3,8 @@
 #include <map>
 #include <optional>
 
+#include <glm/gtc/constants.hpp>
+
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/validate/findings.hpp"
 #include "lib/model/view_checks.hpp"
@@ -53,6 +55,48 @@ void checkHeaders(const Atlas& atlas, Findings& findings) {
         findings.add(5005, "", ok.error().message, "a name and views for each object");
     else if (const auto named = checkNames(atlas); !named)
         findings.add(3009, "", named.error().text(), "names that differ");
+}
+
+/// 3003: where the edges of the image are by the angles, or the window, and by fx and fy.
+void checkFieldOfView(const Camera& c, glm::dvec2 said, const std::string& where,
+                      Findings& findings) {
+    // What half a pixel changes is not drawn from another pixel.
+    constexpr double kMostPixels = 0.5;
+    const auto fits = [&](double angle, double focal, int size) {
+        const double edge = c.orthographic ? focal * angle * 0.5 : focal * std::tan(angle * 0.5);
+        return angle > 0 && (c.orthographic || angle < glm::pi<double>()) &&
+               std::abs(edge - size * 0.5) <= kMostPixels;
+    };
+    if (fits(said.x, c.fx, c.width) && fits(said.y, c.fy, c.height)) return;
+    const glm::dvec2 own = c.fieldOfView();
+    findings.add(3003, where, fmt::format("fieldOfView {:g} {:g}", said.x, said.y),
+                 fmt::format("{:g} {:g}, as of fx, fy and the size", own.x, own.y));
+}
+
+/// 3005: whether axis and angle are the rotation of the quaternion.
+void checkOrientation(const Camera& c, glm::dvec4 said, const std::string& where,
+                      Findings& findings) {
+    // Half of the angle between both, radians. Floats are off by 1e-6; this is a fifth of a pixel
+    // where 1000 of them see one radian.
+    constexpr double kMostHalfAngle = 1e-4;
+    const glm::dquat between = glm::conjugate(c.orientation) * quatFromAxisAngle(said);
+    if (glm::length(glm::dvec3(between.x, between.y, between.z)) <= kMostHalfAngle) return;
+    const glm::dvec4 own = axisAngleFromQuat(c.orientation);
+    findings.add(
+        3005, where, fmt::format("orientation {:g} {:g} {:g} {:g}", said.x, said.y, said.z, said.w),
+        fmt::format("{:g} {:g} {:g} {:g}, as of the quaternion", own.x, own.y, own.z, own.w));
+}
+
+/// What the index says of cameras twice. A camera that breaks a rule itself is left out.
+void checkSaidAgain(const AtlasHeader& header, Findings& findings) {
+    for (std::size_t i = 0; i < header.again.size(); ++i) {
+        const ReferenceView& view = header.atlas.views[i];
+        const AtlasHeader::Again& again = header.again[i];
+        if (!view.camera.check()) continue;
+        const std::string where = viewText(i, view.name);
+        if (again.fieldOfView) checkFieldOfView(view.camera, *again.fieldOfView, where, findings);
+        if (again.orientation) checkOrientation(view.camera, *again.orientation, where, findings);
+    }
 }
 
 /// 4006, 4007, 4030, 6007 and 6008, over the rectangles of each view, which lie inside their page.
@@ -233,6 +277,7 @@ Result<std::vector<Finding>> validateAtlasFile(const std::filesystem::path& path
     if (!header) return unreadable(header.error());
     Findings findings;
     checkHeaders(header->atlas, findings);
+    checkSaidAgain(*header, findings);
     const auto textures =
         std::count_if(header->textures.begin(), header->textures.end(), [](const AtlasTexture& t) {
             return t.attribute != "metallic_roughness" && t.attribute != "emissive";

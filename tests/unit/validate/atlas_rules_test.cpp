@@ -5,6 +5,8 @@
 #include <functional>
 #include <sstream>
 
+#include <nlohmann/json.hpp>
+
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/images/images.hpp"
 #include "tests/temporary_folder.hpp"
@@ -186,6 +188,9 @@ const std::vector<Sample>& samples() {
         {{3003}, "\"fx\":", "\"fx\":-"},
         {{3009}, "\"name\":\"view 1\"", "\"name\":\"view 0\""},
         {{3005}, "\"quaternion\":[-0.", "\"quaternion\":[-5."},
+        // What is said twice is said alike: the first view has angles, the second a window.
+        {{3003}, "\"fieldOfView\":[", "\"fieldOfView\":[9"},
+        {{3005}, "\"orientation\":[-0.", "\"orientation\":[0."},
         {{5001}, "\"atlasX\":", "\"atlasX\":99999"},
         {{5001}, "\"viewX\":", "\"viewX\":-7"},
         {{5001}, "\"view\":1", "\"view\":2"},
@@ -264,6 +269,70 @@ TEST(ValidateAtlas, ImagesOfAFolderHaveTheSizeOfThePage) {
     EXPECT_EQ(numbersOf(validateFile(path, {}, job)), (Numbers{4005, 5004}));
     std::ofstream(path / "depth.png") << "no image";
     EXPECT_EQ(numbersOf(validateFile(path, {}, job)), (Numbers{4005, 5004}));
+}
+
+TEST(ValidateAtlas, CamerasAreSaidAlikeTwice) {
+    const TemporaryFolder folder;
+    Job job;
+    const Atlas good = goodAtlas();
+    ASSERT_TRUE(writeAtlas(good, folder / "a", job));
+    const auto index = nlohmann::ordered_json::parse(textOfFile(folder / "a/atlas.json"));
+    const auto numbersWith = [&](int view, const char* key, const std::vector<double>& said) {
+        auto changed = index;
+        changed["views"][view][key] = said;
+        std::ofstream(folder / "a/atlas.json", std::ios::binary) << changed.dump();
+        // Neither is read where the atlas is drawn.
+        EXPECT_TRUE(readAtlas(folder / "a", job));
+        return numbersOf(validateFile(folder / "a", {}, job));
+    };
+    for (int i = 0; i < 2; ++i) {
+        const Camera& camera = good.views[i].camera;
+        const glm::dvec2 fov = camera.fieldOfView();
+        EXPECT_EQ(numbersWith(i, "fieldOfView", {fov.x, fov.y * 1.00001}), Numbers{}) << i;
+        EXPECT_EQ(numbersWith(i, "fieldOfView", {fov.x, fov.y * 1.1}), Numbers{3003}) << i;
+        EXPECT_EQ(numbersWith(i, "fieldOfView", {-fov.x, fov.y}), Numbers{3003}) << i;
+        const glm::dvec4 turn = axisAngleFromQuat(camera.orientation);
+        // The same rotation the other way round, and as floats have it.
+        EXPECT_EQ(numbersWith(i, "orientation", {-turn.x, -turn.y, -turn.z, -turn.w}), Numbers{});
+        EXPECT_EQ(numbersWith(i, "orientation", {turn.x, turn.y, turn.z, turn.w + 1e-6}),
+                  Numbers{});
+        EXPECT_EQ(numbersWith(i, "orientation", {turn.x, turn.y, turn.z, turn.w + 0.01}),
+                  Numbers{3005});
+    }
+    EXPECT_EQ(numbersWith(0, "fieldOfView", {1}), Numbers{1001});
+}
+
+TEST(ValidateAtlas, AnIndexThatContradictsItselfIsRefused) {
+    const TemporaryFolder folder;
+    Job job;
+    ASSERT_TRUE(writeAtlas(smallAtlas(2, 16, true, false), folder / "a", job));
+    const auto index = nlohmann::ordered_json::parse(textOfFile(folder / "a/atlas.json"));
+    const auto refused = [&](const std::function<void(nlohmann::ordered_json&)>& change,
+                             const std::string& expected) {
+        auto changed = index;
+        change(changed);
+        std::ofstream(folder / "a/atlas.json", std::ios::binary) << changed.dump();
+        const auto findings = validateFile(folder / "a", {}, job);
+        EXPECT_EQ(numbersOf(findings), Numbers{1001}) << expected;
+        EXPECT_NE(textOf(findings).find(expected), std::string::npos) << textOf(findings);
+    };
+    refused([](auto& json) { json["textures"][2]["scale"] = 0; },
+            "textures[2].scale is 0; it must be above 0");
+    refused([](auto& json) { json["duration"] = 0; }, "duration is 0; it must be above 0");
+    refused([](auto& json) { json["linear"] = true; },
+            "textures[0].coding is sRGB8, but linear is true; float goes with true, all others "
+            "with false");
+    refused([](auto& json) { json["textures"][0]["coding"] = "float"; },
+            "textures[0].coding is float, but linear is false");
+    refused(
+        [](auto& json) {
+            json["bounds"]["min"] = {0, 2, 0};
+            json["bounds"]["max"] = {1, 1, 1};
+        },
+        "bounds have a min of 2 above their max of 1; min must not be above max");
+    // Limits of pixels are whole numbers.
+    refused([](auto& json) { json["rectangles"][0]["atlasX"] = 2147483647; },
+            "rectangles[0].atlasX is 2147483647; -536870911 to 536870911 is possible");
 }
 
 /// An atlas of one part with that index and depth.
