@@ -140,7 +140,7 @@ class RectangleCounts {
     }
 
     /// `each`: whether a view without a point breaks a rule; not where some of its rectangles were
-    /// left out, nor of one moment of a film, of which another moment may have the view's points.
+    /// left out.
     void report(bool each, Findings& findings) const {
         for (std::size_t i = 0; i < views_.size(); ++i) {
             const std::string where = viewText(i, views_[i].name);
@@ -228,7 +228,7 @@ void checkTextures(const std::filesystem::path& path, const AtlasHeader& header,
         counts.add(both.depth, both.normal, t.page);
         waiting.erase(t.page);
     }
-    if (allDepth) counts.report(allInside && !header.atlas.time, findings);
+    if (allDepth) counts.report(allInside, findings);
     counts.reportNormals(findings);
 }
 
@@ -265,8 +265,7 @@ std::vector<Finding> validate(const Atlas& atlas) {
         counts.add(page.depth, static_cast<int>(p));
         if (page.normal.size() == size) counts.add(page.depth, page.normal, static_cast<int>(p));
     }
-    counts.report(allDepth && rectangles.size() == atlas.rectangles.size() && !atlas.time,
-                  findings);
+    counts.report(allDepth && rectangles.size() == atlas.rectangles.size(), findings);
     counts.reportNormals(findings);
     return findings.list;
 }

@@ -169,12 +169,27 @@ TEST(ValidateAtlas, EachViewHasPointsAndNormalsThatPointToTheViewer) {
         n = glm::vec3(0);
     });
     lookAt(atlas, {4006});
-    // Others show what was pruned, and another moment of a film what is not there in this one.
+    // Others show what was pruned.
     atlas.views[1].pruned = true;
     lookAt(atlas, {});
-    atlas.views[1].pruned = false;
+}
+
+TEST(ValidateAtlas, AViewOfAFilmHasAPointInOneOfItsAtlases) {
+    const TemporaryFolder folder;
+    Job job;
+    Atlas atlas = facingAtlas();
+    atlas.time = 0;
+    ASSERT_TRUE(writeAtlas(atlas, folder / "f_0", job));
+    forSecondView(atlas, [](float& d, glm::vec3& n) {
+        d = kNoDepth;
+        n = glm::vec3(0);
+    });
     atlas.time = 1;
-    lookAt(atlas, {});
+    ASSERT_TRUE(writeAtlas(atlas, folder / "f_1", job));
+    EXPECT_EQ(numbersOf(validateFile(folder / "f_1", {}, job)), Numbers{4006});
+    EXPECT_EQ(numbersOf(validateFile(folder / "f_%d", {}, job)), Numbers{});
+    fs::remove_all(folder / "f_0");
+    EXPECT_EQ(numbersOf(validateFile(folder / "f_%d", {}, job)), Numbers{4006});
 }
 
 /// What the index of an atlas of two views and one page says after a change.
