@@ -228,7 +228,7 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
         for (auto& c : cameras) {
             c.camera.position -= context.origin;
             if (!o.aligned && !c.aligned) c.camera = context.moved.aligned(c.camera);
-            out.push_back({inPicture(c.camera, size), c.time});
+            out.push_back({inPicture(c.camera, size), c.time, c.name});
         }
         return out;
     }

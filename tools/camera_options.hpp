@@ -71,6 +71,7 @@ void noteSplatsUp(glm::dvec3 up, Job& job);
 struct NovelCamera {
     Camera camera;
     std::optional<double> time = {};
+    std::string name = {};  ///< that a file of cameras has for it; empty: none
 };
 
 /// The cameras asked for, in order, counted from the context's origin. Without any camera option:

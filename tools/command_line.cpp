@@ -131,8 +131,13 @@ std::vector<NamedPath> outputsOf(const PathOptions& paths, const std::string& on
     return outputs;
 }
 
-Result<void> checkPaths(const std::vector<NamedPath>& inputs,
-                        const std::vector<NamedPath>& outputs) {
+/// `app`: the command.
+Result<void> checkPaths(const CLI::App& app, const std::vector<NamedPath>& inputs,
+                        std::vector<NamedPath> outputs) {
+    // Of several objects one is written: in the place of the input the others would be lost.
+    const CLI::Option* object = app.get_option_no_throw("--object");
+    if (object && object->count() > 0)
+        for (NamedPath& output : outputs) output.replaces.clear();
     STX_CHECK(checkOutputNames(outputs, inputs));
     rememberInputs(inputs, outputs);
     for (const NamedPath& output : outputs) {
@@ -407,7 +412,7 @@ Result<void> Command::checkNames(const std::vector<std::string>& inputs,
     all.insert(all.end(), outputs.begin(), outputs.end());
     auto read = alikeAmong(inputs, all);
     addInputsOf(*paths_, read);
-    return checkPaths(read, all);
+    return checkPaths(*app_, read, std::move(all));
 }
 
 CommandLine::CommandLine()
@@ -453,7 +458,7 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
         const std::string only = inputs.size() == 1 ? inputs.front().path : "";
         addInputsOf(entry.paths, inputs);
         const auto outputs = outputsOf(entry.paths, only);
-        STX_CHECK(checkPaths(inputs, outputs));
+        STX_CHECK(checkPaths(*entry.app, inputs, outputs));
         STX_CHECK(checkPrintsAlone(*entry.app, outputs));
         return Request{{}, entry.body, entry.app->get_name()};
     }

@@ -47,7 +47,8 @@ class Option {
     /// The same of what names an output: it has the place neither of an input nor of another one.
     Option& writes(const std::string& what);
     /// The same of an output that is of the input's kind: where there is one input, it may have its
-    /// place, since files are written beside it and renamed at the end.
+    /// place, since files are written beside it and renamed at the end. Not with --object, which
+    /// leaves the other objects of the input out.
     Option& replaces(const std::string& what);
     Option& required();
     /// One value with commas in it is several.

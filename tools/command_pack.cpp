@@ -474,7 +474,7 @@ void addPack(CommandLine& line, Program& program) {
         .required();
     c.option("-o,--output", o->output, "Folder, or one .exr file; of a film a numbered name")
         .required()
-        .replaces("ATLAS");
+        .writes("ATLAS");
     c.option("--names", o->names, "A name for each input (default: its file's, without the ending)")
         .commaSeparated()
         .takes("A,B,...");

@@ -84,6 +84,10 @@ Result<void> saveStill(const ViewTable& table, const RefineOptions& o, SaveOptio
 
 Result<int> refineInput(const RefineOptions& o, const Command& command, Program& program) {
     const Stopwatch watch;
+    for (const auto& [option, steps] :
+         {std::pair("--only", &o.only), {"--with", &o.with}, {"--without", &o.without}})
+        if (steps->empty())
+            STX_CHECK(command.refuse({option}, "is empty; steps are expected, as in noise,edges"));
     if (!o.only.empty())
         STX_CHECK(
             command.refuse({"--with", "--without"}, "does not go with --only; give one of them"));

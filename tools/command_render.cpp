@@ -85,6 +85,12 @@ Result<void> checkOptions(const RenderOptions& o, const Command& command) {
         STX_CHECK(command.refuse({"--compression"}, "is of .png pictures"));
     if (o.backend == Backend::cpu)
         STX_CHECK(command.refuse({"--device"}, "is of GPUs; it does not go with --backend cpu"));
+    if (o.settings.pipeline != GpuPipeline::automatic)
+        for (const auto& [backend, name] : {std::pair(Backend::cpu, "cpu"), {Backend::gl, "gl"}})
+            if (o.backend == backend)
+                STX_CHECK(command.refuse(
+                    {"--pipeline"},
+                    fmt::format("is of the gpu backend; it does not go with --backend {}", name)));
     if (fillOf(o.background))
         STX_CHECK(command.refuse({"--fill"}, "says what --background " + o.background +
                                                  " says already; give one of them"));
@@ -231,13 +237,17 @@ Result<Drawn> drawPictures(const RenderOptions& o, DrawnScene& scene,
     FrameWriter writer(writing, program.job);
     Drawn drawn;
     drawn.renderer = scene.still.get();
+    const auto addToReport = [&](std::size_t i, nlohmann::ordered_json picture) {
+        if (!pictures[i].name.empty()) picture["camera"] = pictures[i].name;
+        if (o.shard.given) picture["index"] = i;
+        drawn.views.push_back(std::move(picture));
+    };
     const auto part = o.shard.rangeOf(pictures.size());
     for (std::size_t i = part.first; i < part.end; ++i) {
         const auto name = writer.nameOf(static_cast<int>(i));
         std::error_code ec;
         if (o.skipExisting && o.output != "-" && std::filesystem::exists(name, ec)) {
-            drawn.views.push_back({{"output", name}, {"skipped", true}});
-            if (o.shard.given) drawn.views.back()["index"] = i;
+            addToReport(i, {{"output", name}, {"skipped", true}});
             continue;
         }
         STX_CHECK(program.job.checkCancelled());
@@ -262,9 +272,9 @@ Result<Drawn> drawPictures(const RenderOptions& o, DrawnScene& scene,
         const double milliseconds = watch.milliseconds();
         drawn.milliseconds += milliseconds;
         ++drawn.count;
-        drawn.views.push_back({{"output", name}, {"milliseconds", milliseconds}});
-        if (scene.moving) drawn.views.back()["time"] = *pictures[i].time;
-        if (o.shard.given) drawn.views.back()["index"] = i;
+        nlohmann::ordered_json picture = {{"output", name}, {"milliseconds", milliseconds}};
+        if (scene.moving) picture["time"] = *pictures[i].time;
+        addToReport(i, std::move(picture));
         const bool nothing =
             scene.environment
                 ? std::ranges::none_of(frame.depth.pixels(), [](float d) { return hasPoint(d); })
@@ -280,6 +290,16 @@ Result<Drawn> drawPictures(const RenderOptions& o, DrawnScene& scene,
     return drawn;
 }
 
+/// What is lost in pictures whose background was to be transparent, as a note.
+void noteAlphaLost(const RenderOptions& o, const DrawnScene& scene, Job& job) {
+    if (o.background != "none" || scene.environment) return;
+    const bool film = o.fileFormat == "y4m";
+    const auto format = frameFormat(o.output);
+    if (film || (format && *format == FrameFormat::jpeg))
+        job.note(
+            fmt::format("{} has no alpha: what no view shows is black", film ? "y4m" : "JPEG"));
+}
+
 /// The notes and the line of a run that is done.
 void sayDrawn(const RenderOptions& o, const DrawnScene& scene, const Drawn& drawn,
               const std::vector<NovelCamera>& pictures, Program& program) {
@@ -290,6 +310,7 @@ void sayDrawn(const RenderOptions& o, const DrawnScene& scene, const Drawn& draw
             "bounds",
             counted(drawn.empty, "picture"), drawn.empty == 1 ? "shows" : "show",
             scene.environment ? " but the environment" : ""));
+    noteAlphaLost(o, scene, program.job);
     program.sayNotes();
     const auto part = o.shard.rangeOf(pictures.size());
     const std::size_t all = part.end - part.first;
@@ -331,6 +352,10 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     STX_TRY(const auto pictures, picturesOf(o, scene, program));
     STX_CHECK(checkNames(o, static_cast<int>(pictures.size()), program));
     STX_CHECK(checkPictures(o, settings, pictures, scene, program.job.limits));
+    // Of a mesh it is noted already, with all that is of views.
+    const bool mayUsePipeline = o.settings.pipeline != GpuPipeline::automatic &&
+                                settings.mode == RenderMode::splat &&
+                                !std::holds_alternative<Mesh>(scene.model);
     writing.origin = scene.context.origin;
     writing.rate = ownRate(o, scene, pictures, program.job).value_or(writing.rate);
     if (!scene.moving) {
@@ -339,6 +364,9 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     program.sayNotes();
 
     STX_TRY(const auto drawn, drawPictures(o, scene, pictures, writing, program));
+    if (mayUsePipeline && drawn.renderer && drawn.renderer->backend() == "cpu")
+        program.job.noteUnused({"--pipeline"}, "",
+                               "it is of the gpu backend, and the cpu backend draws");
     sayDrawn(o, scene, drawn, pictures, program);
     nlohmann::ordered_json report = {
         {"$schema", "render-report.schema.json"},

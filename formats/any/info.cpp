@@ -226,7 +226,8 @@ const char* streamKind(const mpeg4::ElementaryStream& stream) {
 
 Result<void> describeMpeg4(const fs::path& path, Json& out, Job& job) {
     STX_TRY(const auto document, readMpeg4(path, job));
-    const auto container = mpeg4ContainerOf(path).value_or(Mpeg4Container::mp4);
+    STX_TRY(const auto source, ByteSource::open(path));
+    STX_TRY(const auto container, mpeg4ContainerOf(source, path));
     out["container"] = container == Mpeg4Container::bt    ? "bt"
                        : container == Mpeg4Container::xmt ? "xmt"
                                                           : "mp4";

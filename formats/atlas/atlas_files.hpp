@@ -49,6 +49,13 @@ struct AtlasHeader {
     std::vector<AtlasTexture> textures;  ///< at most 4, and those of materials
     std::string environmentFile;         ///< of a folder: its environment; empty: none
 
+    /// What the index says of a view's camera a second time, for engines; empty where it does not.
+    struct Again {
+        std::optional<glm::dvec2> fieldOfView = {};  ///< as Camera::fieldOfView()
+        std::optional<glm::dvec4> orientation = {};  ///< axis x y z and angle, radians
+    };
+    std::vector<Again> again;  ///< of each view, with AtlasChecks::format; else empty
+
     /// Share of the page area that rectangles cover, 0..1.
     [[nodiscard]] double used() const;
 };

@@ -1,6 +1,7 @@
 #include "formats/atlas/atlas_json.hpp"
 
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 namespace stx {
@@ -120,6 +121,11 @@ class Reader {
         to = it->template get<T>();
         return {};
     }
+    Result<void> positive(const char* name, double& to, double most) const {
+        STX_CHECK(number(name, to, 0, most));
+        if (!(to > 0)) return wrong(name, "is 0; it must be above 0");
+        return {};
+    }
     [[nodiscard]] bool has(const char* name) const { return json_.contains(name); }
     Result<void> finite(const char* name, double& to) const {
         return number(name, to, -1e300, 1e300);
@@ -183,7 +189,10 @@ class Reader {
     AtlasChecks checks_;
 };
 
-constexpr double kAnyInt = 2147483647.0;
+/// The largest number of views or pixels that an int holds.
+constexpr int kAnyInt = std::numeric_limits<int>::max();
+/// A quarter of it, so that sums of a rectangle's numbers are ints, too.
+constexpr int kAnyPixel = kAnyInt / 4;
 
 Result<void> readView(const Reader& r, const Limits& limits, int version, bool prunedByCount,
                       ReferenceView& v) {
@@ -231,6 +240,20 @@ Result<void> readView(const Reader& r, const Limits& limits, int version, bool p
     return {};
 }
 
+Result<void> readAgain(const Reader& r, AtlasHeader::Again& again) {
+    if (r.has("fieldOfView")) {
+        std::array<double, 2> angles{};
+        STX_CHECK(r.vector("fieldOfView", angles));
+        again.fieldOfView = {angles[0], angles[1]};
+    }
+    if (r.has("orientation")) {
+        std::array<double, 4> rotation{};
+        STX_CHECK(r.vector("orientation", rotation));
+        again.orientation = {rotation[0], rotation[1], rotation[2], rotation[3]};
+    }
+    return {};
+}
+
 /// Bounds, origin and pixels of an atlas or of one of its objects.
 template <class To>
 Result<void> readPlace(const Reader& r, To& to) {
@@ -238,6 +261,11 @@ Result<void> readPlace(const Reader& r, To& to) {
         std::array<double, 3> min{}, max{};
         STX_CHECK(bounds->vector("min", min));
         STX_CHECK(bounds->vector("max", max));
+        for (std::size_t i = 0; i < min.size(); ++i)
+            if (min[i] > max[i])
+                return r.wrong("bounds", fmt::format("have a min of {} above their max of {}; min "
+                                                     "must not be above max",
+                                                     min[i], max[i]));
         to.bounds = Bounds{{min[0], min[1], min[2]}, {max[0], max[1], max[2]}};
     }
     if (r.has("origin")) {
@@ -284,9 +312,15 @@ Result<void> readTexture(const Reader& r, const Limits& limits, const AtlasHeade
         (t.attribute == "metallic_roughness" && t.coding == "unorm8") ||
         (t.attribute == "emissive" && t.coding == "sRGB8-emissive");
     if (!fits) return r.wrong("coding", fmt::format("is unknown for the {} texture", t.attribute));
+    // An OpenEXR atlas has floats of both, and its textures no files of their own.
+    const bool floats = t.coding == "float";
+    if (t.attribute == "colour" && (header.linear ? !floats : floats && !t.file.empty()))
+        return r.wrong("coding", fmt::format("is {}, but linear is {}; float goes with true, all "
+                                             "others with false",
+                                             t.coding, header.linear));
     int width = header.pageWidth, height = header.pageHeight;
     if (t.coding == "snorm16" || t.coding == "sRGB8-emissive")
-        STX_CHECK(r.number("scale", t.scale, 0, 1e30));
+        STX_CHECK(r.positive("scale", t.scale, 1e30));
     const char* second = secondName(t);
     const bool codes = t.coding == "code8" || t.coding == "code16";
     if ((t.coding == "snorm16" && t.attribute == "splat") || (codes && r.has(second))) {
@@ -425,18 +459,20 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
         STX_CHECK(top.text("environment", header.environmentFile, false));
     if (top.has("time")) STX_CHECK(top.finite("time", atlas.time.emplace()));
     if (top.has("duration"))
-        STX_CHECK(top.number("duration", atlas.duration.emplace(),
-                             std::numeric_limits<double>::min(),
-                             std::numeric_limits<double>::max()));
+        STX_CHECK(
+            top.positive("duration", atlas.duration.emplace(), std::numeric_limits<double>::max()));
     STX_CHECK(
         top.list("textures", top.checksRules() ? 4 + 2 * header.pages : 256, [&](const Reader& r) {
             return readTexture(r, limits, header, header.textures.emplace_back());
         }));
     STX_CHECK(checkTextures(top, header));
-    STX_CHECK(top.list("views", static_cast<std::size_t>(limits.maxViews), [&](const Reader& r) {
+    const auto readNextView = [&](const Reader& r) -> Result<void> {
+        // Reading takes neither, so that only the validator looks at them.
+        if (!r.checksRules()) STX_CHECK(readAgain(r, header.again.emplace_back()));
         return readView(r, limits, version, atlas.keptPixels < atlas.sourcePixels,
                         atlas.views.emplace_back());
-    }));
+    };
+    STX_CHECK(top.list("views", static_cast<std::size_t>(limits.maxViews), readNextView));
     if (top.has("objects")) {
         STX_CHECK(top.list("objects", atlas.views.size(), [&](const Reader& r) {
             return readObject(r, atlas.objects.emplace_back());
@@ -458,7 +494,7 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
                                                                  {"height", &rect.height},
                                                                  {"atlasX", &rect.atlasX},
                                                                  {"atlasY", &rect.atlasY}}) {
-            STX_CHECK(r.number(name, *to, r.checksRules() ? 0 : -kAnyInt / 4, kAnyInt / 4));
+            STX_CHECK(r.number(name, *to, r.checksRules() ? 0 : -kAnyPixel, kAnyPixel));
         }
         return r.flag("turned", rect.turned);
     };

@@ -88,6 +88,9 @@ struct ImageSetOptions {
     RefineSettings refine;
     /// Is told what they did, once for each moment that is read; null: nobody asks.
     std::function<void(const RefineReport&)> refined;
+    /// Called with the error of each view that cannot be read, in their order; reading ends with
+    /// that of the first all the same. Null: the others are not looked at then.
+    std::function<void(const Error&)> failedView;
     YuvColour yuv;
     /// Of the bundle's views: 8, 16 or 32 (float distances). 0: what an export of ours had, else
     /// 16, or 32 where 16 would round by more than an eighth of a pixel's size.

@@ -146,12 +146,15 @@ Result<LoadedViews> loadEach(
                     if (!views) return tl::unexpected(std::move(views.error()));
                     return take(at, *std::move(views));
                 }();
-                if (!loaded[at] && !showNothing[at]) failed = true;
+                if (!loaded[at] && !showNothing[at] && !options.failedView) failed = true;
                 job.progress(++done, static_cast<std::int64_t>(count), "reading views");
             });
     }
     for (Job& own : jobs) own.passNotesOn();
     LoadedViews out;
+    if (options.failedView)
+        for (std::size_t i = 0; i < count; ++i)
+            if (!loaded[i] && !showNothing[i]) options.failedView(loaded[i].error().at(where));
     for (std::size_t i = 0; i < count; ++i) {
         if (loaded[i]) continue;
         if (showNothing[i]) {

@@ -168,6 +168,14 @@ std::optional<Mpeg4Container> mpeg4ContainerOf(ByteSpan head) {
     return {};
 }
 
+Result<std::optional<Mpeg4Container>> mpeg4ContainerOf(const ByteSource& source,
+                                                       const std::filesystem::path& path) {
+    Bytes head(static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), 4096)));
+    STX_CHECK(source.read(0, head));
+    const auto content = mpeg4ContainerOf(ByteSpan(head));
+    return content ? content : mpeg4ContainerOf(path);
+}
+
 Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job) {
     const std::string where = fmt::format("'{}'", path.string());
     ByteSource source;
@@ -178,10 +186,7 @@ Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job) {
     } else {
         STX_TRY(source, ByteSource::open(path));
     }
-    Bytes head(static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), 4096)));
-    STX_CHECK(within(where, source.read(0, head)));
-    auto container = mpeg4ContainerOf(ByteSpan(head));
-    if (!container) container = mpeg4ContainerOf(path);
+    STX_TRY(const auto container, within(where, mpeg4ContainerOf(source, path)));
     if (!container)
         return failAt(
             where, ErrorCode::invalidInput,

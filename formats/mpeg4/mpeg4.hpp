@@ -19,6 +19,11 @@ enum class Mpeg4Container { mp4, bt, xmt };
 /// that BT may begin with.
 [[nodiscard]] std::optional<Mpeg4Container> mpeg4ContainerOf(ByteSpan head);
 
+/// Of an open file: by its first bytes, and where they do not say it by the ending of its name.
+/// Errors: reading.
+[[nodiscard]] Result<std::optional<Mpeg4Container>> mpeg4ContainerOf(
+    const ByteSource& source, const std::filesystem::path& path);
+
 /// Reads a presentation. The content decides which container it is; where it does not, the ending
 /// does. The images of an .mp4 stay in the file; the files that texts name are looked for beside
 /// the text (resolveInside) and opened. Errors as the readers', with the file's name.

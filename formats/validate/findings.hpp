@@ -35,8 +35,26 @@ void checkViewHeader(const ReferenceView& view, const std::string& where, Findin
 /// Rule 6007, where more than one in a hundred of `count` normals, `off`, have no length of 1.
 void checkNormalLengths(std::int64_t off, std::int64_t count, const std::string& where,
                         Findings& findings);
-/// Rules on normals that need pixels; normals and camera of the view are in one frame.
-void checkVectors(const ReferenceView& view, const std::string& where, Findings& findings);
+
+/// The normals of a view, counted one by one for rules 6007 and 6008.
+class NormalCounts {
+  public:
+    /// Normals and `camera` are in one frame. Directions are looked at where it passes check().
+    explicit NormalCounts(const Camera& camera)
+        : camera_(camera), directed_(camera.check().has_value()) {}
+
+    /// Pixel (x, y) of the view. Those without a point or without a normal (0 0 0) do not count.
+    void add(int x, int y, float depth, glm::vec3 normal);
+    /// All pixels of the view, whose depth and normals have its size.
+    void add(const Image<float>& depth, const Image<glm::vec3>& normal);
+    void reportLengths(const std::string& where, Findings& findings) const;
+    void reportDirections(const std::string& where, Findings& findings) const;
+
+  private:
+    Camera camera_;
+    bool directed_ = false;
+    std::int64_t count_ = 0, off_ = 0, notFinite_ = 0, away_ = 0;
+};
 
 /// Rule 4005 on the environment of a bundle or atlas, as reading it went.
 void checkEnvironment(const Result<std::shared_ptr<const Environment>>& read, Findings& findings);

@@ -27,7 +27,7 @@ struct ValidateOptions {
 /// The rules on cameras, depths, normals and splats, for a bundle of any container. Needs no
 /// check() before.
 [[nodiscard]] std::vector<Finding> validate(const Bundle& bundle);
-/// The rules on cameras, depths and the layout of an atlas. Needs no check() before.
+/// The rules on cameras, depths, normals and the layout of an atlas. Needs no check() before.
 [[nodiscard]] std::vector<Finding> validate(const Atlas& atlas);
 
 }  // namespace stx

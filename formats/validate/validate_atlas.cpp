@@ -1,4 +1,9 @@
+#include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
+
+#include <glm/gtc/constants.hpp>
 
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/validate/findings.hpp"
@@ -52,15 +57,61 @@ void checkHeaders(const Atlas& atlas, Findings& findings) {
         findings.add(3009, "", named.error().text(), "names that differ");
 }
 
-/// 4030, over the rectangles of each view.
-class OutsideCounts {
-  public:
-    explicit OutsideCounts(const std::vector<ReferenceView>& views)
-        : views_(views), outside_(views.size()) {}
+/// 3003: where the edges of the image are by the angles, or the window, and by fx and fy.
+void checkFieldOfView(const Camera& c, glm::dvec2 said, const std::string& where,
+                      Findings& findings) {
+    // What half a pixel changes is not drawn from another pixel.
+    constexpr double kMostPixels = 0.5;
+    const auto fits = [&](double angle, double focal, int size) {
+        const double edge = c.orthographic ? focal * angle * 0.5 : focal * std::tan(angle * 0.5);
+        return angle > 0 && (c.orthographic || angle < glm::pi<double>()) &&
+               std::abs(edge - size * 0.5) <= kMostPixels;
+    };
+    if (fits(said.x, c.fx, c.width) && fits(said.y, c.fy, c.height)) return;
+    const glm::dvec2 own = c.fieldOfView();
+    findings.add(3003, where, fmt::format("fieldOfView {:g} {:g}", said.x, said.y),
+                 fmt::format("{:g} {:g}, as of fx, fy and the size", own.x, own.y));
+}
 
-    /// `page` has the depth; rectangles lie inside it.
-    void add(const Image<float>& depth, const std::vector<AtlasRectangle>& rectangles, int page) {
-        for (const AtlasRectangle& r : rectangles) {
+/// 3005: whether axis and angle are the rotation of the quaternion.
+void checkOrientation(const Camera& c, glm::dvec4 said, const std::string& where,
+                      Findings& findings) {
+    // Half of the angle between both, radians. Floats are off by 1e-6; this is a fifth of a pixel
+    // where 1000 of them see one radian.
+    constexpr double kMostHalfAngle = 1e-4;
+    const glm::dquat between = glm::conjugate(c.orientation) * quatFromAxisAngle(said);
+    if (glm::length(glm::dvec3(between.x, between.y, between.z)) <= kMostHalfAngle) return;
+    const glm::dvec4 own = axisAngleFromQuat(c.orientation);
+    findings.add(
+        3005, where, fmt::format("orientation {:g} {:g} {:g} {:g}", said.x, said.y, said.z, said.w),
+        fmt::format("{:g} {:g} {:g} {:g}, as of the quaternion", own.x, own.y, own.z, own.w));
+}
+
+/// What the index says of cameras twice. A camera that breaks a rule itself is left out.
+void checkSaidAgain(const AtlasHeader& header, Findings& findings) {
+    for (std::size_t i = 0; i < header.again.size(); ++i) {
+        const ReferenceView& view = header.atlas.views[i];
+        const AtlasHeader::Again& again = header.again[i];
+        if (!view.camera.check()) continue;
+        const std::string where = viewText(i, view.name);
+        if (again.fieldOfView) checkFieldOfView(view.camera, *again.fieldOfView, where, findings);
+        if (again.orientation) checkOrientation(view.camera, *again.orientation, where, findings);
+    }
+}
+
+/// 4006, 4007, 4030, 6007 and 6008, over the rectangles of each view, which lie inside their page.
+class RectangleCounts {
+  public:
+    RectangleCounts(const std::vector<ReferenceView>& views,
+                    const std::vector<AtlasRectangle>& rectangles)
+        : views_(views),
+          rectangles_(rectangles),
+          points_(views.size()),
+          outside_(views.size()),
+          normals_(views.size()) {}
+
+    void add(const Image<float>& depth, int page) {
+        for (const AtlasRectangle& r : rectangles_) {
             if (r.page != page) continue;
             const ReferenceView& view = views_[r.view];
             const double slack = (view.farPlane - view.nearPlane) * 1e-4;
@@ -69,27 +120,56 @@ class OutsideCounts {
                                          .subspan(static_cast<std::size_t>(r.atlasX),
                                                   static_cast<std::size_t>(r.atlasWidth()))) {
                     if (std::isinf(d) && d > 0) continue;
-                    ++points_;
+                    ++points_[r.view];
                     if (!(d >= 0 && d >= view.nearPlane - slack && d <= view.farPlane + slack))
                         ++outside_[r.view];
                 }
         }
     }
-    void report(Findings& findings) const {
-        for (std::size_t i = 0; i < outside_.size(); ++i) {
-            if (outside_[i] == 0) continue;
-            findings.add(4030, viewText(i, views_[i].name),
-                         fmt::format("{} distances outside {} to {}", outside_[i],
-                                     views_[i].nearPlane, views_[i].farPlane),
-                         "distances between the planes");
+    void add(const Image<float>& depth, const Image<glm::vec3>& normal, int page) {
+        for (const AtlasRectangle& r : rectangles_) {
+            if (r.page != page) continue;
+            auto& normals = normals_[r.view];
+            if (!normals) normals.emplace(views_[r.view].camera);
+            for (int y = r.viewY; y < r.viewY + r.height; ++y)
+                for (int x = r.viewX; x < r.viewX + r.width; ++x) {
+                    const glm::ivec2 at = r.atlasFromView(x, y);
+                    normals->add(x, y, depth.at(at.x, at.y), normal.at(at.x, at.y));
+                }
         }
-        if (points_ == 0) findings.add(4007, "", "no point in any view", "points");
+    }
+
+    /// `each`: whether a view without a point breaks a rule; not where some of its rectangles were
+    /// left out.
+    void report(bool each, Findings& findings) const {
+        for (std::size_t i = 0; i < views_.size(); ++i) {
+            const std::string where = viewText(i, views_[i].name);
+            // Pruning may take all points of a view: others show them.
+            if (each && points_[i] == 0 && !views_[i].pruned)
+                findings.add(4006, where, "no point", "one point at least");
+            if (outside_[i] > 0)
+                findings.add(4030, where,
+                             fmt::format("{} distances outside {} to {}", outside_[i],
+                                         views_[i].nearPlane, views_[i].farPlane),
+                             "distances between the planes");
+        }
+        if (std::ranges::all_of(points_, [](std::int64_t n) { return n == 0; }))
+            findings.add(4007, "", "no point in any view", "points");
+    }
+    void reportNormals(Findings& findings) const {
+        for (std::size_t i = 0; i < views_.size(); ++i) {
+            if (!normals_[i]) continue;
+            const std::string where = viewText(i, views_[i].name);
+            normals_[i]->reportLengths(where, findings);
+            normals_[i]->reportDirections(where, findings);
+        }
     }
 
   private:
     const std::vector<ReferenceView>& views_;
-    std::vector<std::int64_t> outside_;
-    std::int64_t points_ = 0;
+    const std::vector<AtlasRectangle>& rectangles_;
+    std::vector<std::int64_t> points_, outside_;
+    std::vector<std::optional<NormalCounts>> normals_;
 };
 
 std::string textureText(const AtlasTexture& t) {
@@ -97,11 +177,19 @@ std::string textureText(const AtlasTexture& t) {
                           : fmt::format("'{}'", t.file);
 }
 
-/// Sizes of the images and what is in them. `header` has good rectangles only.
-void checkTextures(const std::filesystem::path& path, const AtlasHeader& header,
+/// Sizes of the images and what is in them. `header` has good rectangles only; `allInside`: no
+/// others were there.
+void checkTextures(const std::filesystem::path& path, const AtlasHeader& header, bool allInside,
                    const ValidateOptions& options, Job& job, Findings& findings) {
-    OutsideCounts counts(header.atlas.views);
+    RectangleCounts counts(header.atlas.views, header.atlas.rectangles);
     bool allDepth = options.pixels;
+    // What normals are looked at with; of each page the first of both waits for the other.
+    std::map<int, AtlasPage> waiting;
+    const auto hasNormals = [&](int page) {
+        return std::ranges::any_of(header.textures, [&](const AtlasTexture& other) {
+            return other.page == page && other.attribute == "normal";
+        });
+    };
     for (const AtlasTexture& t : header.textures) {
         if (job.cancelled) return;
         const std::string where = textureText(t);
@@ -127,13 +215,21 @@ void checkTextures(const std::filesystem::path& path, const AtlasHeader& header,
             if (!read) findings.add(4005, where, read.error().text(), "an image that can be read");
             fits = read.has_value();
         }
-        if (!isDepth) continue;
-        if (fits && options.pixels)
-            counts.add(page.depth, header.atlas.rectangles, t.page);
+        const bool isRead = fits && options.pixels;
+        if (isDepth && !isRead) allDepth = false;
+        if (isDepth && isRead) counts.add(page.depth, t.page);
+        if (!isRead || !(isDepth ? hasNormals(t.page) : t.attribute == "normal")) continue;
+        AtlasPage& both = waiting[t.page];
+        if (isDepth)
+            both.depth = std::move(page.depth);
         else
-            allDepth = false;
+            both.normal = std::move(page.normal);
+        if (both.depth.empty() || both.normal.empty()) continue;
+        counts.add(both.depth, both.normal, t.page);
+        waiting.erase(t.page);
     }
-    if (allDepth) counts.report(findings);
+    if (allDepth) counts.report(allInside, findings);
+    counts.reportNormals(findings);
 }
 
 }  // namespace
@@ -160,11 +256,17 @@ std::vector<Finding> validate(const Atlas& atlas) {
     }
     auto rectangles = atlas.rectangles;
     checkRectangles(atlas.views, static_cast<int>(atlas.pages.size()), size, rectangles, findings);
-    OutsideCounts counts(atlas.views);
-    for (std::size_t p = 0; p < atlas.pages.size(); ++p)
-        if (atlas.pages[p].depth.size() == size)
-            counts.add(atlas.pages[p].depth, rectangles, static_cast<int>(p));
-    counts.report(findings);
+    RectangleCounts counts(atlas.views, rectangles);
+    bool allDepth = true;
+    for (std::size_t p = 0; p < atlas.pages.size(); ++p) {
+        const AtlasPage& page = atlas.pages[p];
+        allDepth = allDepth && page.depth.size() == size;
+        if (page.depth.size() != size) continue;
+        counts.add(page.depth, static_cast<int>(p));
+        if (page.normal.size() == size) counts.add(page.depth, page.normal, static_cast<int>(p));
+    }
+    counts.report(allDepth && rectangles.size() == atlas.rectangles.size(), findings);
+    counts.reportNormals(findings);
     return findings.list;
 }
 
@@ -174,14 +276,17 @@ Result<std::vector<Finding>> validateAtlasFile(const std::filesystem::path& path
     if (!header) return unreadable(header.error());
     Findings findings;
     checkHeaders(header->atlas, findings);
+    checkSaidAgain(*header, findings);
     const auto textures =
         std::count_if(header->textures.begin(), header->textures.end(), [](const AtlasTexture& t) {
             return t.attribute != "metallic_roughness" && t.attribute != "emissive";
         });
     if (textures > 4) findings.add(5003, "", fmt::format("{} textures", textures), "at most 4");
+    const std::size_t rectangles = header->atlas.rectangles.size();
     checkRectangles(header->atlas.views, header->pages, {header->pageWidth, header->pageHeight},
                     header->atlas.rectangles, findings);
-    checkTextures(path, *header, options, job, findings);
+    checkTextures(path, *header, header->atlas.rectangles.size() == rectangles, options, job,
+                  findings);
     if (options.pixels) checkEnvironment(readAtlasEnvironment(path, *header, job), findings);
     return findings.list;
 }

@@ -36,45 +36,37 @@ void checkNormalLengths(std::int64_t off, std::int64_t count, const std::string&
                      "length 1");
 }
 
-namespace {
-
-void checkNormalLengths(const ReferenceView& view, const std::string& where, Findings& findings) {
-    std::int64_t count = 0, off = 0, notFinite = 0;
-    for (std::size_t i = 0; i < view.depth.count(); ++i) {
-        const glm::vec3 n = view.normal.data()[i];
-        if (!hasPoint(view.depth.data()[i]) || n == glm::vec3(0)) continue;
-        ++count;
-        if (!std::isfinite(glm::dot(n, glm::vec3(1))))
-            ++notFinite;
-        else if (!hasNormalLength(n))
-            ++off;
-    }
-    // Rounding makes no such numbers, so that one is too many.
-    if (notFinite > 0)
-        findings.add(6007, where,
-                     fmt::format("{} of {} normals with NaN or infinity", notFinite, count),
-                     "length 1");
-    else
-        checkNormalLengths(off, count, where, findings);
+void NormalCounts::add(int x, int y, float depth, glm::vec3 normal) {
+    if (!hasPoint(depth) || normal == glm::vec3(0)) return;
+    ++count_;
+    if (!std::isfinite(glm::dot(normal, glm::vec3(1))))
+        ++notFinite_;
+    else if (!hasNormalLength(normal))
+        ++off_;
+    if (!directed_) return;
+    const glm::dvec3 towards = -camera_.viewDirection(x + 0.5, y + 0.5);
+    // Edge-on normals are rounded to either side.
+    if (glm::dot(glm::dvec3(normal), towards) < -0.05) ++away_;
 }
 
-}  // namespace
+void NormalCounts::add(const Image<float>& depth, const Image<glm::vec3>& normal) {
+    for (int y = 0; y < depth.height(); ++y)
+        for (int x = 0; x < depth.width(); ++x) add(x, y, depth.at(x, y), normal.at(x, y));
+}
 
-void checkVectors(const ReferenceView& view, const std::string& where, Findings& findings) {
-    if (!view.hasNormals()) return;
-    std::int64_t count = 0, away = 0;
-    for (int y = 0; y < view.depth.height(); ++y) {
-        for (int x = 0; x < view.depth.width(); ++x) {
-            const glm::vec3 n = view.normal.at(x, y);
-            if (!hasPoint(view.depth.at(x, y)) || n == glm::vec3(0)) continue;
-            ++count;
-            const glm::dvec3 towards = -view.camera.viewDirection(x + 0.5, y + 0.5);
-            // Edge-on normals are rounded to either side.
-            if (glm::dot(glm::dvec3(n), towards) < -0.05) ++away;
-        }
-    }
-    if (away * 10 > count)
-        findings.add(6008, where, fmt::format("{} of {} normals point away from it", away, count),
+void NormalCounts::reportLengths(const std::string& where, Findings& findings) const {
+    // Rounding makes no such numbers, so that one is too many.
+    if (notFinite_ > 0)
+        findings.add(6007, where,
+                     fmt::format("{} of {} normals with NaN or infinity", notFinite_, count_),
+                     "length 1");
+    else
+        checkNormalLengths(off_, count_, where, findings);
+}
+
+void NormalCounts::reportDirections(const std::string& where, Findings& findings) const {
+    if (away_ * 10 > count_)
+        findings.add(6008, where, fmt::format("{} of {} normals point away from it", away_, count_),
                      "normals that point to the viewer");
 }
 
@@ -139,8 +131,12 @@ std::int64_t checkViewImages(const ReferenceView& view, const std::string& where
                      fmt::format("{} of {} distances outside {} to {}", outside, points,
                                  view.nearPlane, view.farPlane),
                      "distances between the planes");
-    if (view.normal.size() == size) checkNormalLengths(view, where, findings);
-    if (view.normal.size() == size && view.camera.check()) checkVectors(view, where, findings);
+    if (view.normal.size() == size) {
+        NormalCounts normals(view.camera);
+        normals.add(view.depth, view.normal);
+        normals.reportLengths(where, findings);
+        normals.reportDirections(where, findings);
+    }
     return points;
 }
 

@@ -25,6 +25,17 @@ Result<std::vector<Finding>> ofUnreadSet(Error error) {
     return unreadable(error);
 }
 
+/// The same of each view that cannot be read; where there is none, of what ended the reading.
+Result<std::vector<Finding>> ofUnreadViews(const std::vector<Error>& views, const Error& ended) {
+    if (views.empty()) return ofUnreadSet(ended);
+    std::vector<Finding> all;
+    for (const Error& error : views) {
+        STX_TRY(auto found, ofUnreadSet(error));
+        std::ranges::move(found, std::back_inserter(all));
+    }
+    return all;
+}
+
 /// Takes away what is not a fault of a frame where other frames of the film do without it: a view,
 /// or all of them, without a point (rules 4006 and 4007). `files`: the findings of each.
 void forgiveEmptyFrames(std::vector<std::vector<Finding>>& files) {
@@ -61,6 +72,8 @@ std::vector<Finding> ofAllParts(std::vector<std::vector<Finding>> each,
 Result<std::vector<Finding>> validateSetFrames(const std::filesystem::path& path,
                                                ImageSetOptions set, Job& job) {
     set.strict = true;  // the frame before in its place would be sound
+    std::vector<Error> unread;
+    set.failedView = [&](const Error& error) { unread.push_back(error); };
     STX_TRY(const auto frames, openImageSet(path, set, job));
     std::vector<std::vector<Finding>> each(frames->timeline().count());
     std::set<std::string> said;
@@ -74,7 +87,7 @@ Result<std::vector<Finding>> validateSetFrames(const std::filesystem::path& path
             return validateViews(*table, i == 0 ? job : quiet);
         }();
         if (!found) {
-            STX_SET(found, ofUnreadSet(found.error()));
+            STX_SET(found, ofUnreadViews(std::exchange(unread, {}), found.error()));
             std::erase_if(*found, [&](const Finding& f) { return !said.insert(f.text()).second; });
         }
         each[i] = std::move(*found);
@@ -95,12 +108,14 @@ Result<std::vector<Finding>> validateImageSet(const std::filesystem::path& path,
     if (!findings.list.empty() || !options.pixels) return findings.list;
     ImageSetOptions asGiven;
     asGiven.refine.set(RefineStep::poses, false);
+    std::vector<Error> unread;
+    asGiven.failedView = [&](const Error& error) { unread.push_back(error); };
     auto found = [&]() -> Result<std::vector<Finding>> {
         if (set->timeline.moves()) return validateSetFrames(path, asGiven, job);
         STX_TRY(const auto table, openSetViews(path, asGiven, job, heldWhole(job.limits)));
         return validateViews(*table, job);
     }();
-    return found ? std::move(found) : ofUnreadSet(found.error());
+    return found ? std::move(found) : ofUnreadViews(unread, found.error());
 }
 
 /// Each file of a film, its findings with its name, and files that are missing between others.

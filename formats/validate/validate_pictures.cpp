@@ -58,7 +58,9 @@ void checkNormals(const Node& node, const DecodedImage& normals, const DecodedIm
         glm::dvec3(node.get<glm::vec3>("position")),
         quatFromAxisAngle(axisAngle(node.get<Rotation>("orientation"))), glm::dvec2(fov),
         node.get<bool>("orthographic"), codes.width, codes.height);
-    checkVectors(view, where, findings);
+    NormalCounts counts(view.camera);
+    counts.add(view.depth, view.normal);
+    counts.reportDirections(where, findings);
 }
 
 std::uint32_t highestCode(const DecodedImage& codes, int channel) {

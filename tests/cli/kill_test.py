@@ -220,7 +220,6 @@ def in_place(args, inputs, folder):
                         ("a.bt", ["convert", "a.bt", "-o", "OUT"]),
                         ("a.mp4", ["bake", "a.mp4", "-o", "OUT"]),
                         ("a.exr", ["bake", "a.exr", "-o", "OUT"]),
-                        ("a.exr", ["pack", "a.exr", "-o", "OUT"]),
                         ("a.mp4", ["select", "a.mp4", "-o", "OUT"])):
         ending = os.path.splitext(name)[1]
         first, second = (tempfile.mkdtemp(dir=folder) for _ in range(2))

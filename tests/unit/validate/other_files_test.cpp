@@ -65,6 +65,20 @@ TEST(ValidateImageSets, WhatCannotBeReadBreaksRule1001) {
     EXPECT_EQ(rulesOf(folder / "set"), Numbers{1001});
 }
 
+TEST(ValidateImageSets, EachDamagedPictureIsNamed) {
+    const TemporaryFolder folder;
+    Job job;
+    ASSERT_TRUE(exportViews(*viewsOf(smallBundle(4, 16, false, false)), folder / "set", {}, job));
+    std::ofstream(folder / "set/images/view_1.png") << "not a picture";
+    std::filesystem::resize_file(folder / "set/depth/view_3.exr", 200);
+    const auto findings = validateFile(folder / "set", {}, job);
+    ASSERT_TRUE(findings) << findings.error().text();
+    EXPECT_EQ(numbersOf(*findings), Numbers{1001});
+    ASSERT_EQ(findings->size(), 2u) << textOf(*findings);
+    EXPECT_NE(findings->at(0).text().find("view_1.png"), std::string::npos) << textOf(*findings);
+    EXPECT_NE(findings->at(1).text().find("view_3.exr"), std::string::npos) << textOf(*findings);
+}
+
 /// A set of two cameras at three moments. The second sees nothing at the second one.
 void writeMovingSet(const TemporaryFolder& folder) {
     Job job;
@@ -107,6 +121,21 @@ TEST(ValidateImageSets, EachFrameOfOneThatMovesIsRead) {
     EXPECT_TRUE(findings->at(0).where.starts_with("frame 0 (0 s)")) << textOf(*findings);
     EXPECT_TRUE(findings->at(1).where.starts_with("frame 2 (0.08 s)")) << textOf(*findings);
     EXPECT_NE(textOf(*findings).find("view_1_0002.png"), std::string::npos) << textOf(*findings);
+}
+
+TEST(ValidateImageSets, EachDamagedPictureOfAFrameIsNamedOnce) {
+    const TemporaryFolder folder;
+    Job job;
+    ASSERT_NO_FATAL_FAILURE(writeMovingSet(folder));
+    for (const char* name : {"view_0_0002.png", "view_1_0002.png"}) {
+        ASSERT_TRUE(std::filesystem::exists(folder / "set/images" / name)) << name;
+        std::ofstream(folder / "set/images" / name) << "not a picture";
+    }
+    const auto findings = validateFile(folder / "set", {}, job);
+    ASSERT_TRUE(findings) << findings.error().text();
+    ASSERT_EQ(findings->size(), 2u) << textOf(*findings);
+    EXPECT_NE(findings->at(0).text().find("view_0_0002.png"), std::string::npos);
+    EXPECT_NE(findings->at(1).text().find("view_1_0002.png"), std::string::npos);
 }
 
 TEST(ValidateMeshes, AreReadOrBreakRule1001) {
