@@ -394,17 +394,18 @@ Result<RectanglePacking> packRectangles(const std::vector<glm::ivec2>& sizes,
     const bool square =
         std::all_of(sizes.begin(), sizes.end(), [](glm::ivec2 s) { return s.x == s.y; });
     const bool tryTurns = limits.mayTurn && !square;
+    const auto refused = [&] {
+        return fail(ErrorCode::invalidInput,
+                    "{} rectangles with {} pixels do not fit on {} of {}{}x{}{}",
+                    problem.rectangles, problem.area,
+                    limits.maxPages > 1 ? fmt::format("{} textures", limits.maxPages) : "a texture",
+                    exact ? "" : "at most ", most.x, most.y, whatWouldDo(sizes, limits));
+    };
     if (exact || limits.powerOfTwo) {
         auto packing = exact ? pagesOf(problem, limits.size, limits.maxPages, tryTurns)
                              : powerOfTwoPages(problem, limits.maxPages, tryTurns);
         if (packing) return *packing;
-        return fail(ErrorCode::invalidInput,
-                    "{} rectangles with {} pixels do not fit on {} of {}{}", problem.rectangles,
-                    problem.area,
-                    limits.maxPages > 1 ? fmt::format("{} textures", limits.maxPages) : "a texture",
-                    exact ? fmt::format("{}x{}", most.x, most.y)
-                          : fmt::format("at most {}x{}", most.x, most.y),
-                    whatWouldDo(sizes, limits));
+        return refused();
     }
     auto best = bestPage(problem, false, tryTurns ? kWork / 2 : kWork);
     if (tryTurns && (!best || best->area() > problem.area)) {
@@ -424,14 +425,7 @@ Result<RectanglePacking> packRectangles(const std::vector<glm::ivec2>& sizes,
             if (auto packing = severalPages(problem, pages, turn)) return *packing;
         }
     }
-    const double side = std::sqrt(static_cast<double>(problem.area) / limits.maxPages / 0.95);
-    return fail(
-        ErrorCode::invalidInput,
-        "{} rectangles with {} pixels need {} of about {:.0f}x{:.0f}, but textures are at most "
-        "{}x{}",
-        problem.rectangles, problem.area,
-        limits.maxPages > 1 ? fmt::format("{} pages", limits.maxPages) : "a texture",
-        std::ceil(side), std::ceil(side), limits.maxSize, limits.maxSize);
+    return refused();
 }
 
 }  // namespace stx

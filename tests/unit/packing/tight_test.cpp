@@ -112,6 +112,22 @@ TEST(Rectangles, TakePagesWhenOneIsNotEnough) {
     EXPECT_EQ(none.error().code, ErrorCode::invalidInput);
 }
 
+TEST(Rectangles, SayWhatWouldDo) {
+    // Room for them there is, but one of 84 pixels alone fits on a page of 150.
+    const std::vector<glm::ivec2> three(3, {84, 84});
+    RectangleLimits limits{150, 2, true};
+    for (const glm::ivec2 size : {glm::ivec2(0), glm::ivec2(150)}) {
+        limits.size = size;
+        const auto none = packRectangles(three, limits);
+        ASSERT_FALSE(none);
+        EXPECT_EQ(
+            none.error().message,
+            fmt::format("3 rectangles with 21168 pixels do not fit on 2 textures of {}150x150; "
+                        "84x252 would do",
+                        size.x > 0 ? "" : "at most "));
+    }
+}
+
 TEST(Rectangles, AtTheExactLimit) {
     const auto packing = packRectangles(std::vector<glm::ivec2>(4, {512, 512}), {1024, 1, true});
     ASSERT_TRUE(packing);
