@@ -87,14 +87,25 @@ Result<Atlas> packForFile(const ViewTable& views, PackSettings settings, const s
                     "an image here holds two pictures, so that pages of {}x{} make one of more "
                     "than {} pixels; take a smaller --size, or a larger --max-size",
                     settings.size.x, settings.size.y, limit);
-    settings.maxSize = limit / 2;
-    Job quiet;  // the same notes again
-    quiet.limits = job.limits;
-    auto smaller = pack(views, settings, quiet);
-    if (!smaller && smaller.error().code == ErrorCode::invalidInput)
-        smaller.error().message += fmt::format(
-            "; an image here holds two pictures, so that each gets half of the {} pixels", limit);
-    return smaller;
+    atlas = Atlas();
+    // The shorter side of a page is doubled (AtlasTexture::addSecond()): that alone has half.
+    std::optional<Result<Atlas>> best;
+    for (const glm::ivec2 page : {glm::ivec2(limit, limit / 2), glm::ivec2(limit / 2, limit)}) {
+        settings.maxPage = page;
+        Job quiet;  // the same notes again
+        quiet.workFor(job);
+        auto found = pack(views, settings, quiet);
+        if (!found && found.error().code != ErrorCode::invalidInput) return found;
+        if (!best || (found && (!*best || found->pages.size() < (*best)->pages.size())))
+            best = std::move(found);
+        if (*best && (*best)->pages.size() == 1) break;  // fewer there cannot be
+    }
+    if (!*best)
+        best->error().message += fmt::format(
+            "; an image here holds two pictures, so that one side of each gets half of the {} "
+            "pixels",
+            limit);
+    return *std::move(best);
 }
 
 bool prunes(const PackOptions& o) {

@@ -233,6 +233,10 @@ Result<void> checkSettings(const ViewTable& table, const PackSettings& settings)
         (size.x < 1 || size.y < 1 || std::max(size.x, size.y) > settings.maxSize))
         return fail(ErrorCode::usage, "textures of {}x{} are asked for; 1 to {} is possible",
                     size.x, size.y, settings.maxSize);
+    const glm::ivec2 page = settings.maxPage;
+    if (page != glm::ivec2(0) && (page.x < 1 || page.y < 1))
+        return fail(ErrorCode::usage, "the largest page is {}x{}; 1 or more is possible", page.x,
+                    page.y);
     if (table.whole()) STX_CHECK(table.about().check());
     if (settings.objects) STX_CHECK(checkObjects(*settings.objects, table.count()));
     if (!settings.contentOf) return {};

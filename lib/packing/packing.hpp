@@ -31,6 +31,8 @@ struct PackSettings {
     int maxSize = 16384;  ///< largest width and height of a texture: what a GPU takes; 1..65535
     /// Each page is exactly this large, whatever is left of it; {0, 0}: as large as is needed.
     glm::ivec2 size{0};
+    /// Largest page, where one side may be longer than the other; {0, 0}: maxSize both ways.
+    glm::ivec2 maxPage{0};
     /// Width and height of pages are powers of two, the smallest in which all fits.
     bool powerOfTwo = false;
     /// Of several models in one bundle (joinObjects()): which views are whose; null: it is one.
