@@ -221,7 +221,8 @@ Result<std::vector<PageImages>> PageScene::add(const Atlas& atlas, Job& job) {
             return fail(ErrorCode::invalidInput, "the depth of a page has 8 or 16 bits, not 32");
         pruned_ = pruned_ || view.pruned;
         Json v = pageCamera(view.camera, view.name);
-        v["noDepth"] = nameOf(view.noDepth);
+        // For what no rectangle shows: of a masked view that is empty.
+        v["noDepth"] = nameOf(view.masked.value_or(false) ? NoDepth::empty : view.noDepth);
         v["pruned"] = view.pruned;
         v["nearPlane"] = view.nearPlane;
         v["farPlane"] = view.farPlane;

@@ -205,8 +205,9 @@ struct LackingPixels {
     [[nodiscard]] bool masked() const { return empty > covered; }
 };
 
-/// The same as lacksDepthByMask(), of what an atlas keeps of a view.
-bool showsMask(const Atlas& atlas, std::size_t view) {
+/// lacksDepthByMask() of a view of an atlas; of atlases that do not say it, of what they keep.
+bool isMasked(const Atlas& atlas, std::size_t view) {
+    if (atlas.views[view].masked) return *atlas.views[view].masked;
     const Camera& camera = atlas.views[view].camera;
     LackingPixels lacking;
     for (const AtlasRectangle& r : atlas.rectangles) {
@@ -339,7 +340,9 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
     STX_CHECK(job.checkCancelled());
     std::vector<std::vector<const AtlasRectangle*>> ofView(count);
     for (const AtlasRectangle& r : atlas.rectangles) ofView[source[r.view]].push_back(&r);
+    const bool tight = settings.layout == PackSettings::Layout::tight;
     std::vector<std::int64_t> object(count), points(count);
+    std::vector<std::optional<bool>> masked(count);
     STX_CHECK(forEachView(
         table, {"an atlas", 0}, job,
         [&](std::size_t i, const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
@@ -349,8 +352,11 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
             });
             object[i] = objectPixels(*view);
             points[i] = view->pointCount();
+            // What the rectangles leave out decides with what they show.
+            if (tight && view->noDepth == NoDepth::unknown) masked[i] = lacksDepthByMask(*view);
             return {};
         }));
+    for (std::size_t k = 0; k < source.size(); ++k) atlas.views[k].masked = masked[source[k]];
     atlas.sourcePixels = std::reduce(object.begin(), object.end());
     if (settings.sourcePixels > 0) atlas.sourcePixels = settings.sourcePixels;
     if (settings.objects) {
@@ -380,7 +386,7 @@ std::vector<std::uint64_t> outsideBits(const Atlas& atlas, std::size_t of) {
     std::vector<std::uint64_t> bits(
         (static_cast<std::size_t>(camera.width) * camera.height + 63) / 64, 0);
     // Nothing is known there, wherever others look.
-    if (atlas.views[of].noDepth == NoDepth::unknown && !showsMask(atlas, of)) {
+    if (atlas.views[of].noDepth == NoDepth::unknown && !isMasked(atlas, of)) {
         std::ranges::fill(bits, ~std::uint64_t{0});
         return bits;
     }
@@ -450,6 +456,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     parallelFor(0, atlas.views.size(), [&](std::size_t i) {
         ReferenceView& view = bundle.views[i];
         view = withoutImages(atlas.views[i]);
+        view.masked.reset();  // its pixels say it
         const int width = view.camera.width, height = view.camera.height;
         view.texture = emptyTexture(width, height, contents.linear);
         view.depth = Image<float>(width, height, kNoDepth);

@@ -84,8 +84,9 @@ struct JoinedObjects {
 /// rectangle shows it. Empty, as if none were set, where nothing of the object is missing: in
 /// atlases with all its pixels (keptPixels = sourcePixels), and of views that are neither pruned
 /// nor have unknown depth. Else that is where points of other views fall, a little generously, and
-/// everywhere in a view whose missing depth is unknown, unless its rectangles and their padding
-/// show that it is masked as lacksDepthByMask() says. The atlas must pass check().
+/// everywhere in a view whose missing depth is unknown, unless it is masked as lacksDepthByMask()
+/// says of the whole view (ViewHeader::masked; of older atlases: of its rectangles and their
+/// padding). The atlas must pass check().
 [[nodiscard]] std::vector<std::uint64_t> outsideBits(const Atlas& atlas, std::size_t view);
 
 /// The bundle of an atlas: every pixel of every rectangle back in its view. Pixels in no rectangle

@@ -299,6 +299,21 @@ TEST(AtlasFiles, SameBytesOnAnyNumberOfThreads) {
     EXPECT_EQ(get(folder / "many.exr"), get(folder / "one.exr"));
 }
 
+TEST(AtlasFiles, MaskedViewsComeBackAsSuch) {
+    const TemporaryFolder folder;
+    Atlas atlas = smallAtlas(3, 16, false, false);
+    for (ReferenceView& view : atlas.views) view.noDepth = NoDepth::unknown;
+    atlas.views[0].masked = true;
+    atlas.views[1].masked = false;
+    for (const char* name : {"set", "a.exr"}) {
+        const Atlas back = writtenAndRead(atlas, folder / name);
+        ASSERT_EQ(back.views.size(), 3u);
+        EXPECT_EQ(back.views[0].masked, std::optional(true)) << name;
+        EXPECT_EQ(back.views[1].masked, std::optional(false)) << name;
+        EXPECT_FALSE(back.views[2].masked.has_value()) << name;
+    }
+}
+
 TEST(AtlasFiles, AnAtlasReplacesAnAtlasOnly) {
     const TemporaryFolder folder;
     writtenAndRead(smallAtlas(3, 32, true, false), folder / "set");
@@ -407,6 +422,8 @@ TEST(AtlasSchema, HoldsForWhatIsWritten) {
     sheet.objects[1].name = "cup";
     sheet.objects[1].firstView = 1;
     sheet.objects[1].views = 2;
+    sheet.views[0].noDepth = NoDepth::unknown;
+    sheet.views[0].masked = true;
     ASSERT_TRUE(writeAtlas(sheet, folder / "sheet", job));
     const std::string schema = STX_SOURCE_DIR "/formats/atlas/atlas.schema.json";
     const std::string script =

@@ -168,6 +168,39 @@ TEST(Prune, AHoleOfTheSensorDoesNotFillWhatIsAroundAMask) {
     }
 }
 
+TEST(Prune, ManyHolesOfTheSensorDoNotFillWhatIsAroundAMask) {
+    // Rectangles and their padding show more holes inside the mask than pixels around it.
+    Bundle bundle = torusViews();
+    for (ReferenceView& view : bundle.views) {
+        view.noDepth = NoDepth::unknown;
+        for (int y = 0; y < view.depth.height(); ++y)
+            for (int x = 0; x < view.depth.width(); ++x)
+                if (hasPoint(view.depth.at(x, y)) && (x / 6 + y / 6) % 2 == 0)
+                    view.depth.at(x, y) = kNoDepth;  // with full alpha
+        ASSERT_TRUE(lacksDepthByMask(view));
+    }
+    Job job;
+    PackSettings settings;
+    settings.layout = PackSettings::Layout::tight;
+    for (const bool pruned : {false, true}) {
+        if (pruned) {
+            const auto report = prune(bundle, {}, job);
+            ASSERT_TRUE(report) << report.error().text();
+            settings.sourcePixels = report->sourcePixels;
+        }
+        const auto atlas = pack(bundle, settings, job);
+        ASSERT_TRUE(atlas);
+        for (const ReferenceView& view : atlas->views)
+            EXPECT_TRUE(view.noDepth == NoDepth::empty || view.masked.value_or(false));
+        const auto unpacked = unpack(*atlas, job);
+        ASSERT_TRUE(unpacked);
+        for (const ReferenceView& view : unpacked->views) {
+            EXPECT_EQ(view.texture.at(0, 0).a, 0);
+            EXPECT_FALSE(view.masked.has_value()) << "that is of atlases";
+        }
+    }
+}
+
 TEST(Prune, WhatASensorMissedIsCountedBeside) {
     // Two photographs that fill their frames; the sensor missed a part of the first.
     Bundle bundle = torusViews();
