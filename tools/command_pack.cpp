@@ -165,7 +165,10 @@ struct Packed {
 Result<Packed> packViews(const PackOptions& o, std::unique_ptr<ViewTable> views,
                          PackSettings settings, const std::optional<PrunedTo>& pruned,
                          const Stopwatch& watch, Job& job) {
-    if (pruned) settings.sourcePixels = pruned->report.sourcePixels;
+    if (pruned) {
+        settings.sourcePixels = pruned->report.sourcePixels;
+        settings.unmeasuredPixels = pruned->report.unmeasuredPixels;
+    }
     STX_TRY(auto atlas, within(fmt::format("'{}'", o.input),
                                packForFile(*views, settings, o.output, o.save, job)));
     views.reset();
@@ -209,12 +212,6 @@ Result<std::optional<PrunedTo>> pruneViews(const PackOptions& o, const std::stri
     };
     STX_TRY(auto pruning, within(fmt::format("'{}'", input), found()));
     const PrunedTo pruned{pruning.report, o.minPsnr > 0};
-    const std::int64_t unmeasured = pruning.report.unmeasuredPixels;
-    if (unmeasured > 0 && o.settings.layout == PackSettings::Layout::tight)
-        job.note(
-            fmt::format("'{}': of {} pixels that have colours but no depth, the tight layout keeps "
-                        "only those amid others; --layout grid keeps all",
-                        input, unmeasured));
     views = prunedViews(std::move(views), std::move(pruning));
     return pruned;
 }
@@ -326,9 +323,11 @@ Result<std::vector<std::string>> objectNames(const PackOptions& o) {
     return names;
 }
 
-/// One input as an object: pruned, of one moment. Its views are read from `frames`.
+/// One input as an object: pruned, of one moment. Its views are read from `frames`; what pruning
+/// finds of colours without a depth is added to `settings`.
 Result<PackTable> openObject(const PackOptions& o, const std::string& input,
-                             const std::string& name, std::unique_ptr<Sequence>& frames, Job& job) {
+                             const std::string& name, std::unique_ptr<Sequence>& frames,
+                             PackSettings& settings, Job& job) {
     preloadCodecs(input);
     STX_TRY(frames, openSequence(input, openOptions(o), job));
     STX_TRY(frames, refined(std::move(frames), o.refine, kPacking, folderOf(o.output)));
@@ -346,7 +345,11 @@ Result<PackTable> openObject(const PackOptions& o, const std::string& input,
     object.name = name;
     STX_TRY(object.views, frames->views(moment, job));
     STX_TRY(const auto pruned, pruneViews(o, input, object.views, job));
-    if (pruned) object.sourcePixels = pruned->report.sourcePixels;
+    if (pruned) {
+        object.sourcePixels = pruned->report.sourcePixels;
+        settings.unmeasuredPixels =
+            settings.unmeasuredPixels.value_or(0) + pruned->report.unmeasuredPixels;
+    }
     return object;
 }
 
@@ -383,10 +386,12 @@ Result<int> packSheet(const PackOptions& o, const Command& command, Program& pro
             fmt::format("{} is met by each object", o.budget.empty() ? "--min-psnr" : "--budget"));
     std::vector<std::unique_ptr<Sequence>> frames(o.inputs.size());
     std::vector<PackTable> objects;
+    PackSettings settings = o.settings;
     std::uint64_t bytes = 0, held = 0;
     for (std::size_t i = 0; i < o.inputs.size(); ++i) {
         STX_CHECK(program.job.checkCancelled());
-        STX_TRY(auto object, openObject(o, o.inputs[i], names[i], frames[i], program.job));
+        STX_TRY(auto object,
+                openObject(o, o.inputs[i], names[i], frames[i], settings, program.job));
         bytes += bytesOf(o.inputs[i]);
         held += object.views->bytesHeld();
         STX_CHECK(program.job.limits.checkAllocation(held, 1, "the views of all objects"));
@@ -397,7 +402,6 @@ Result<int> packSheet(const PackOptions& o, const Command& command, Program& pro
     else
         program.job.noteUnused(command.given({"--period"}), kOfAtlases, kOneMoment);
     STX_TRY(auto joined, joinTables(std::move(objects), program.job));
-    PackSettings settings = o.settings;
     settings.objects = &joined.objects;
     STX_TRY(auto atlas, packForFile(*joined.views, settings, o.output, o.save, program.job));
     joined.views.reset();

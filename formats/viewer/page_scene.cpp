@@ -193,6 +193,7 @@ void makeViewable(Bundle& bundle, Job& job) {
 Result<Atlas> packForPage(const Bundle& bundle, Job& job) {
     PackSettings settings;
     settings.layout = PackSettings::Layout::tight;
+    settings.unmeasuredPixels = 0;  // a page has these behind all else, or says that it has not
     Result<Atlas> atlas = Atlas();
     for (const int side : kSides) {
         settings.maxSize = side;

@@ -184,6 +184,13 @@ void dropIfZero(Image<T>& image) {
 
 }  // namespace
 
+std::int64_t unmeasuredPixels(const ReferenceView& view) {
+    if (view.noDepth != NoDepth::unknown || view.pruned || view.background ||
+        lacksDepthByMask(view))
+        return 0;
+    return objectPixels(view) - view.pointCount();
+}
+
 std::int64_t objectPixels(const ReferenceView& view) {
     std::int64_t n = 0;
     for (int y = 0; y < view.depth.height(); ++y) {
@@ -287,6 +294,20 @@ Atlas emptyAtlas(const ViewTable& table, const AtlasLayout& layout, const Conten
     return atlas;
 }
 
+/// Says that the tight layout leaves out colours without a depth. `found`: in views as they are.
+void noteUnmeasured(const PackSettings& settings, std::int64_t found, Job& job) {
+    const std::int64_t pixels = settings.unmeasuredPixels.value_or(found);
+    if (pixels <= 0) return;
+    constexpr const char* kSaid =
+        "pixels that have colours but no depth, the tight layout keeps only those amid others; "
+        "--layout grid keeps all";
+    // Frames have other numbers each, and one line is enough for a film.
+    if (settings.contentOf)
+        job.noteOnce(fmt::format("of {}", kSaid));
+    else
+        job.note(fmt::format("of {} {}", pixels, kSaid));
+}
+
 std::uint64_t pixelsOf(const AtlasLayout& layout) {
     return static_cast<std::uint64_t>(layout.width) * static_cast<std::uint64_t>(layout.height) *
            static_cast<std::uint64_t>(layout.pages);
@@ -342,6 +363,7 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
     for (const AtlasRectangle& r : atlas.rectangles) ofView[source[r.view]].push_back(&r);
     const bool tight = settings.layout == PackSettings::Layout::tight;
     std::vector<std::int64_t> object(count), points(count);
+    std::vector<std::int64_t> unmeasured(count);
     std::vector<std::optional<bool>> masked(count);
     STX_CHECK(forEachView(
         table, {"an atlas", 0}, job,
@@ -352,8 +374,10 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
             });
             object[i] = objectPixels(*view);
             points[i] = view->pointCount();
+            if (!tight) return {};
+            unmeasured[i] = unmeasuredPixels(*view);
             // What the rectangles leave out decides with what they show.
-            if (tight && view->noDepth == NoDepth::unknown) masked[i] = lacksDepthByMask(*view);
+            if (view->noDepth == NoDepth::unknown) masked[i] = lacksDepthByMask(*view);
             return {};
         }));
     for (std::size_t k = 0; k < source.size(); ++k) atlas.views[k].masked = masked[source[k]];
@@ -364,6 +388,7 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
         for (const auto& o : atlas.objects) atlas.sourcePixels += o.sourcePixels;
     }
     atlas.keptPixels = std::reduce(points.begin(), points.end());
+    if (tight) noteUnmeasured(settings, std::reduce(unmeasured.begin(), unmeasured.end()), job);
     return atlas;
 }
 

@@ -22,7 +22,8 @@ struct PackSettings {
         /// patches where that saves room, fitted closely, turned where that makes the textures
         /// smaller. Views without content are dropped with a note, but for frames that are packed
         /// alike. Pixels of full alpha without a depth (pruned, or missed by a sensor) are left out
-        /// and counted in Atlas::sourcePixels.
+        /// unless they lie amid others, and counted in Atlas::sourcePixels; of those that a sensor
+        /// missed a note says so.
         tight,
     };
     Layout layout = Layout::grid;
@@ -40,6 +41,9 @@ struct PackSettings {
     /// Object pixels before pruning (PruneReport::sourcePixels), for Atlas::sourcePixels; 0 = the
     /// points and the pixels of full alpha without a depth.
     std::int64_t sourcePixels = 0;
+    /// Pixels with colours but no depth before pruning (PruneReport::unmeasuredPixels), for the
+    /// note of the tight layout, 0: there is none; nothing: those of views that were not pruned.
+    std::optional<std::int64_t> unmeasuredPixels{};
     /// Memory that writing takes beside the pages, bytes a pixel; nothing: the most of any
     /// container.
     std::optional<std::uint64_t> bytesToWrite{};

@@ -212,6 +212,22 @@ TEST(Prune, WhatASensorMissedIsCountedBeside) {
     const auto pixels = static_cast<std::int64_t>(2 * bundle.views[0].depth.count());
     const auto points = bundle.pointCount();
     Job job;
+    const std::vector<std::string> said = {
+        fmt::format("of {} pixels that have colours but no depth, the tight layout keeps only "
+                    "those amid others; --layout grid keeps all",
+                    pixels - points)};
+    // The same without pruning; a grid keeps all, and so does a mask that is empty around.
+    for (const auto layout : {PackSettings::Layout::grid, PackSettings::Layout::tight}) {
+        PackSettings settings;
+        settings.layout = layout;
+        ASSERT_TRUE(pack(bundle, settings, job));
+        EXPECT_EQ(job.takeNotes(),
+                  layout == PackSettings::Layout::tight ? said : std::vector<std::string>());
+        Bundle masked = torusViews();
+        for (ReferenceView& view : masked.views) view.noDepth = NoDepth::unknown;
+        ASSERT_TRUE(pack(masked, settings, job));
+        EXPECT_TRUE(job.takeNotes().empty());
+    }
     for (const bool measured : {false, true}) {
         Bundle pruned = bundle;
         const auto report =
@@ -224,8 +240,11 @@ TEST(Prune, WhatASensorMissedIsCountedBeside) {
         PackSettings settings;
         settings.layout = PackSettings::Layout::tight;
         settings.sourcePixels = report->sourcePixels;
-        const auto atlas = pack(pruned, settings, job);
+        settings.unmeasuredPixels = report->unmeasuredPixels;
+        Job packing;
+        const auto atlas = pack(pruned, settings, packing);
         ASSERT_TRUE(atlas);
+        EXPECT_EQ(packing.takeNotes(), said);
         const auto unpacked = unpack(*atlas, job);
         ASSERT_TRUE(unpacked);
         EXPECT_EQ(unpacked->views[0].texture.at(0, 0).a, 1) << "unknown, not empty";
