@@ -6,16 +6,13 @@
 #include <functional>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/splat_steps.hpp"
 #include "lib/model/srgb8.hpp"
 
 namespace stx {
 
 namespace {
 
-/// Share of a splat's half axis, which reaches about to the next sample, that a step of its code
-/// may be: rounding to half a step moves the end of a splat by a two hundredth of a sample then,
-/// which no picture of these samples shows. SPZ rounds sizes by 3 %.
-constexpr double kSplatStep = 0.01;
 /// Share of the brightest light of an object that its code may be off: less is seen as one light
 /// (Weber's law, 1 to 2 %).
 constexpr double kLightRounding = 0.02;
@@ -40,20 +37,15 @@ void forEachPixelOf(const Atlas& atlas, const AtlasObject& object, int page, con
     }
 }
 
-/// Whether a step of the splats' codes is more than kSplatStep of an object's median axis.
+/// Whether the steps of the splats' codes are too coarse for an object.
 bool areSplatsCoarse(const Atlas& atlas, const AtlasObject& object, const AtlasTexture& t) {
     const AtlasPage& page = atlas.pages[t.page];
-    const double least = t.scale / 32767.0 / kSplatStep;
-    std::int64_t axes = 0, shorter = 0;
+    SplatSteps steps(t.scale / 32767.0);
     forEachPixelOf(atlas, object, t.page, [&](int x, int y) {
-        for (const Image<glm::vec3>* image : {&page.splatU, &page.splatV}) {
-            const glm::dvec3 axis(image->at(x, y));
-            if (axis == glm::dvec3(0)) continue;
-            ++axes;
-            shorter += glm::dot(axis, axis) < least * least ? 1 : 0;
-        }
+        steps.add(page.splatU.at(x, y));
+        steps.add(page.splatV.at(x, y));
     });
-    return 2 * shorter > axes;
+    return steps.tooCoarse();
 }
 
 /// Whether the brightest light of an object may be off by more than kLightRounding.
@@ -230,11 +222,11 @@ void noteCoarseScales(const Atlas& atlas, const std::vector<AtlasTexture>& textu
             const std::string names =
                 namesOf(atlas, [&](const AtlasObject& o) { return areSplatsCoarse(atlas, o, t); });
             if (!names.empty())
-                job.noteOnce(
-                    fmt::format("splat axes{}are coded in steps of more than 1 % of their median: "
-                                "one scale, that of the longest axis, holds for a whole texture; "
-                                "an .exr atlas keeps them exactly",
-                                names));
+                job.noteOnce(fmt::format(
+                    "splat axes{}are coded in steps of more than {:g} % of their median: "
+                    "one scale, that of the longest axis, holds for a whole texture; "
+                    "an .exr atlas keeps them exactly",
+                    names, 100 * SplatSteps::kMostStep));
         }
         // The light of one model alone has the scale that it needs.
         if (t.coding == "sRGB8-emissive" && !atlas.objects.empty()) {
@@ -242,10 +234,10 @@ void noteCoarseScales(const Atlas& atlas, const std::vector<AtlasTexture>& textu
                 namesOf(atlas, [&](const AtlasObject& o) { return isLightCoarse(atlas, o, t); });
             if (!names.empty())
                 job.noteOnce(
-                    fmt::format("emitted light{}is rounded by more than 2 %, even where it is "
+                    fmt::format("emitted light{}is rounded by more than {:g} %, even where it is "
                                 "brightest: one scale, that of the brightest object, holds for a "
                                 "whole texture; an .exr atlas keeps it exactly",
-                                names));
+                                names, 100 * kLightRounding));
         }
     }
 }

@@ -326,6 +326,7 @@ class SequenceWriter {
         if (asVideo()) {
             loss_.linear = loss_.linear || images.linear;
             loss_.clamped = loss_.clamped || images.clamped;
+            loss_.splats = loss_.splats || images.splatsCoarse;
             track.coverageLost = track.coverageLost || images.coverageLost;
         } else {
             const auto k = static_cast<std::size_t>(&track - tracks_.data());

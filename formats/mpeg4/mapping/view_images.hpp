@@ -21,6 +21,7 @@ struct ViewImages {
     bool clamped = false;   ///< linear colour above 1 was cut
     bool unmeasuredLost = false;  ///< colours without a depth
     bool coverageLost = false;
+    bool splatsCoarse = false;  ///< SplatSteps::tooCoarse() of their codes
     /// Of planes of video, which have no alpha, where coverage is lost: a hash of it; else 0.
     std::size_t coverage = 0;
 };
@@ -45,7 +46,7 @@ class DepthLoss {
 /// What pictures of MPEG-4 lose of the views that are added, for notes.
 struct PictureLoss {
     std::vector<DepthLoss> depth;  ///< of each view
-    bool linear = false, clamped = false, coverage = false;
+    bool linear = false, clamped = false, coverage = false, splats = false;
     /// DepthLoss::add()'s of each view, where the views have the range of a film; else empty.
     std::vector<double> ownSteps;
 
