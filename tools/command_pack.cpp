@@ -87,14 +87,25 @@ Result<Atlas> packForFile(const ViewTable& views, PackSettings settings, const s
                     "an image here holds two pictures, so that pages of {}x{} make one of more "
                     "than {} pixels; take a smaller --size, or a larger --max-size",
                     settings.size.x, settings.size.y, limit);
-    settings.maxSize = limit / 2;
-    Job quiet;  // the same notes again
-    quiet.limits = job.limits;
-    auto smaller = pack(views, settings, quiet);
-    if (!smaller && smaller.error().code == ErrorCode::invalidInput)
-        smaller.error().message += fmt::format(
-            "; an image here holds two pictures, so that each gets half of the {} pixels", limit);
-    return smaller;
+    atlas = Atlas();
+    // The shorter side of a page is doubled (AtlasTexture::addSecond()): that alone has half.
+    std::optional<Result<Atlas>> best;
+    for (const glm::ivec2 page : {glm::ivec2(limit, limit / 2), glm::ivec2(limit / 2, limit)}) {
+        settings.maxPage = page;
+        Job quiet;  // the same notes again
+        quiet.workFor(job);
+        auto found = pack(views, settings, quiet);
+        if (!found && found.error().code != ErrorCode::invalidInput) return found;
+        if (!best || (found && (!*best || found->pages.size() < (*best)->pages.size())))
+            best = std::move(found);
+        if (*best && (*best)->pages.size() == 1) break;  // fewer there cannot be
+    }
+    if (!*best)
+        best->error().message += fmt::format(
+            "; an image here holds two pictures, so that one side of each gets half of the {} "
+            "pixels",
+            limit);
+    return *std::move(best);
 }
 
 bool prunes(const PackOptions& o) {
@@ -154,7 +165,10 @@ struct Packed {
 Result<Packed> packViews(const PackOptions& o, std::unique_ptr<ViewTable> views,
                          PackSettings settings, const std::optional<PrunedTo>& pruned,
                          const Stopwatch& watch, Job& job) {
-    if (pruned) settings.sourcePixels = pruned->report.sourcePixels;
+    if (pruned) {
+        settings.sourcePixels = pruned->report.sourcePixels;
+        settings.unmeasuredPixels = pruned->report.unmeasuredPixels;
+    }
     STX_TRY(auto atlas, within(fmt::format("'{}'", o.input),
                                packForFile(*views, settings, o.output, o.save, job)));
     views.reset();
@@ -198,12 +212,6 @@ Result<std::optional<PrunedTo>> pruneViews(const PackOptions& o, const std::stri
     };
     STX_TRY(auto pruning, within(fmt::format("'{}'", input), found()));
     const PrunedTo pruned{pruning.report, o.minPsnr > 0};
-    const std::int64_t unmeasured = pruning.report.unmeasuredPixels;
-    if (unmeasured > 0 && o.settings.layout == PackSettings::Layout::tight)
-        job.note(
-            fmt::format("'{}': of {} pixels that have colours but no depth, the tight layout keeps "
-                        "only those amid others; --layout grid keeps all",
-                        input, unmeasured));
     views = prunedViews(std::move(views), std::move(pruning));
     return pruned;
 }
@@ -315,9 +323,11 @@ Result<std::vector<std::string>> objectNames(const PackOptions& o) {
     return names;
 }
 
-/// One input as an object: pruned, of one moment. Its views are read from `frames`.
+/// One input as an object: pruned, of one moment. Its views are read from `frames`; what pruning
+/// finds of colours without a depth is added to `settings`.
 Result<PackTable> openObject(const PackOptions& o, const std::string& input,
-                             const std::string& name, std::unique_ptr<Sequence>& frames, Job& job) {
+                             const std::string& name, std::unique_ptr<Sequence>& frames,
+                             PackSettings& settings, Job& job) {
     preloadCodecs(input);
     STX_TRY(frames, openSequence(input, openOptions(o), job));
     STX_TRY(frames, refined(std::move(frames), o.refine, kPacking, folderOf(o.output)));
@@ -335,7 +345,11 @@ Result<PackTable> openObject(const PackOptions& o, const std::string& input,
     object.name = name;
     STX_TRY(object.views, frames->views(moment, job));
     STX_TRY(const auto pruned, pruneViews(o, input, object.views, job));
-    if (pruned) object.sourcePixels = pruned->report.sourcePixels;
+    if (pruned) {
+        object.sourcePixels = pruned->report.sourcePixels;
+        settings.unmeasuredPixels =
+            settings.unmeasuredPixels.value_or(0) + pruned->report.unmeasuredPixels;
+    }
     return object;
 }
 
@@ -372,10 +386,12 @@ Result<int> packSheet(const PackOptions& o, const Command& command, Program& pro
             fmt::format("{} is met by each object", o.budget.empty() ? "--min-psnr" : "--budget"));
     std::vector<std::unique_ptr<Sequence>> frames(o.inputs.size());
     std::vector<PackTable> objects;
+    PackSettings settings = o.settings;
     std::uint64_t bytes = 0, held = 0;
     for (std::size_t i = 0; i < o.inputs.size(); ++i) {
         STX_CHECK(program.job.checkCancelled());
-        STX_TRY(auto object, openObject(o, o.inputs[i], names[i], frames[i], program.job));
+        STX_TRY(auto object,
+                openObject(o, o.inputs[i], names[i], frames[i], settings, program.job));
         bytes += bytesOf(o.inputs[i]);
         held += object.views->bytesHeld();
         STX_CHECK(program.job.limits.checkAllocation(held, 1, "the views of all objects"));
@@ -386,7 +402,6 @@ Result<int> packSheet(const PackOptions& o, const Command& command, Program& pro
     else
         program.job.noteUnused(command.given({"--period"}), kOfAtlases, kOneMoment);
     STX_TRY(auto joined, joinTables(std::move(objects), program.job));
-    PackSettings settings = o.settings;
     settings.objects = &joined.objects;
     STX_TRY(auto atlas, packForFile(*joined.views, settings, o.output, o.save, program.job));
     joined.views.reset();

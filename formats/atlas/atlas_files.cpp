@@ -164,6 +164,7 @@ Result<void> writeFolder(const Atlas& atlas, const fs::path& path, Job& job,
                          const AtlasSaveOptions& options, const DepthIsCoded& depthIsCoded) {
     const AtlasHeader header = headerOf(atlas, false, options.jpegQuality > 0);
     if (options.jpegQuality > 0) STX_CHECK(checkJpeg(header, path));
+    noteCoarseScales(atlas, header.textures, job);
     STX_TRY(auto folder, OutputFolder::create(path, options.output, ownNames()));
     STX_CHECK(parallelTry(0, header.textures.size(), [&](std::size_t i) -> Result<void> {
         const AtlasTexture& t = header.textures[i];

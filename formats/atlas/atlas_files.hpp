@@ -81,11 +81,12 @@ struct AtlasSaveOptions {
 /// splat.png (and, where the views have them, metallic_roughness.png and emissive.png), those of
 /// page k > 0 as colour_k.png and so on.
 /// The environment is environment.exr, or a part of its own (environment_exr.hpp).
-/// 8- and 16-bit depth comes back to the code and normals to 1/32767; an atlas with a view of 32
-/// depth bits gets .exr images, and everything comes back to the bit. Linear colour is colour.exr.
-/// Depth that belongs to no rectangle or its padding is dropped with a note. Colours under alpha 0
-/// are filled again from their neighbours when they come from OpenEXR or go to JPEG. Errors:
-/// Atlas::check(); files; unsupported: JPEG where OpenEXR is needed.
+/// 8- and 16-bit depth comes back to the code, normals to 1/32767 and splats to as much of the
+/// longest axis of their texture (where that is much for the splats of an object, a note says so);
+/// an atlas with a view of 32 depth bits gets .exr images, and everything comes back to the bit.
+/// Linear colour is colour.exr. Depth that belongs to no rectangle or its padding is dropped with a
+/// note. Colours under alpha 0 are filled again from their neighbours when they come from OpenEXR
+/// or go to JPEG. Errors: Atlas::check(); files; unsupported: JPEG where OpenEXR is needed.
 [[nodiscard]] Result<void> writeAtlas(const Atlas& atlas, const std::filesystem::path& path,
                                       Job& job, const AtlasSaveOptions& options = {});
 /// The same bytes; depth takes no memory any more once it is coded.

@@ -44,6 +44,7 @@ Json jsonOf(const ReferenceView& v) {
     j["farPlane"] = v.farPlane;
     j["depthBits"] = v.depthBits;
     if (v.noDepth == NoDepth::unknown) j["noDepth"] = nameOf(v.noDepth);
+    if (v.masked) j["masked"] = *v.masked;
     if (!v.refined.steps.empty()) j["refined"] = v.refined.text();
     j["pruned"] = v.pruned;
     if (v.background) j["background"] = true;
@@ -222,6 +223,7 @@ Result<void> readView(const Reader& r, const Limits& limits, int version, bool p
     const auto named = noDepthNamed(noDepth);
     if (!named) return r.wrong("noDepth", "must be empty or unknown");
     v.noDepth = *named;
+    if (r.has("masked")) STX_CHECK(r.flag("masked", v.masked.emplace()));
     std::string refined;
     STX_CHECK(r.text("refined", refined, false));
     if (!refined.empty()) {

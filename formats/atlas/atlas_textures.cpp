@@ -3,13 +3,77 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/splat_steps.hpp"
 #include "lib/model/srgb8.hpp"
 
 namespace stx {
 
 namespace {
+
+/// Share of the brightest light of an object that its code may be off: less is seen as one light
+/// (Weber's law, 1 to 2 %).
+constexpr double kLightRounding = 0.02;
+
+/// The objects of an atlas, or all of it as one without a name.
+std::vector<AtlasObject> objectsOf(const Atlas& atlas) {
+    if (!atlas.objects.empty()) return atlas.objects;
+    AtlasObject all;
+    all.views = static_cast<int>(atlas.views.size());
+    return {all};
+}
+
+/// Calls visit(x, y) for the pixels of an object on a page.
+template <class Visit>
+void forEachPixelOf(const Atlas& atlas, const AtlasObject& object, int page, const Visit& visit) {
+    for (const AtlasRectangle& r : atlas.rectangles) {
+        if (r.page != page || r.view < object.firstView ||
+            r.view - object.firstView >= object.views)
+            continue;
+        for (int y = r.atlasY; y < r.atlasY + r.atlasHeight(); ++y)
+            for (int x = r.atlasX; x < r.atlasX + r.atlasWidth(); ++x) visit(x, y);
+    }
+}
+
+/// Whether the steps of the splats' codes are too coarse for an object.
+bool areSplatsCoarse(const Atlas& atlas, const AtlasObject& object, const AtlasTexture& t) {
+    const AtlasPage& page = atlas.pages[t.page];
+    SplatSteps steps(t.scale / 32767.0);
+    forEachPixelOf(atlas, object, t.page, [&](int x, int y) {
+        steps.add(page.splatU.at(x, y));
+        steps.add(page.splatV.at(x, y));
+    });
+    return steps.tooCoarse();
+}
+
+/// Whether the brightest light of an object may be off by more than kLightRounding.
+bool isLightCoarse(const Atlas& atlas, const AtlasObject& object, const AtlasTexture& t) {
+    const Image<glm::vec3>& emissive = atlas.pages[t.page].emissive;
+    float largest = 0;
+    forEachPixelOf(atlas, object, t.page, [&](int x, int y) {
+        const glm::vec3 light = emissive.at(x, y);
+        largest = std::max({largest, light.x, light.y, light.z});
+    });
+    const auto share = static_cast<float>(largest / t.scale);
+    const std::uint8_t code = srgb8FromLinear(share);
+    if (!(largest > 0) || code == 255) return false;
+    // Half of the step to the next code.
+    const double off = 0.5 * (linearFromSrgb8(code + 1) - linearFromSrgb8(code));
+    return off > kLightRounding * share;
+}
+
+/// " of 'cup', 'jug'", of the objects that a check finds; " " of an atlas without; else nothing.
+std::string namesOf(const Atlas& atlas, const std::function<bool(const AtlasObject&)>& found) {
+    std::string names;
+    for (const AtlasObject& o : objectsOf(atlas)) {
+        if (!found(o)) continue;
+        if (o.name.empty()) return " ";
+        names += fmt::format("{}'{}'", names.empty() ? " of " : ", ", o.name);
+    }
+    return names.empty() ? names : names + " ";
+}
 
 /// Which view each pixel of a row of a page belongs to, -1 = none: first by all rectangles with
 /// their padding, then by all without, so that a rectangle's own pixels are always its own, and
@@ -150,6 +214,32 @@ double emissiveScale(const Image<glm::vec3>& emissive) {
         }
     }
     return largest;
+}
+
+void noteCoarseScales(const Atlas& atlas, const std::vector<AtlasTexture>& textures, Job& job) {
+    for (const AtlasTexture& t : textures) {
+        if (t.coding == "snorm16" && t.attribute == "splat") {
+            const std::string names =
+                namesOf(atlas, [&](const AtlasObject& o) { return areSplatsCoarse(atlas, o, t); });
+            if (!names.empty())
+                job.noteOnce(fmt::format(
+                    "splat axes{}are coded in steps of more than {:g} % of their median: "
+                    "one scale, that of the longest axis, holds for a whole texture; "
+                    "an .exr atlas keeps them exactly",
+                    names, 100 * SplatSteps::kMostStep));
+        }
+        // The light of one model alone has the scale that it needs.
+        if (t.coding == "sRGB8-emissive" && !atlas.objects.empty()) {
+            const std::string names =
+                namesOf(atlas, [&](const AtlasObject& o) { return isLightCoarse(atlas, o, t); });
+            if (!names.empty())
+                job.noteOnce(
+                    fmt::format("emitted light{}is rounded by more than {:g} %, even where it is "
+                                "brightest: one scale, that of the brightest object, holds for a "
+                                "whole texture; an .exr atlas keeps it exactly",
+                                names, 100 * kLightRounding));
+        }
+    }
 }
 
 std::vector<std::uint8_t> bytesOf(const Image<glm::vec2>& metallicRoughness) {

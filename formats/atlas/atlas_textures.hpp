@@ -43,6 +43,10 @@ void codeVectors(const Image<glm::vec3>& vectors, double scale, int x0, int y0, 
 
 /// The linear light of code 255: the largest component, at least 1.
 [[nodiscard]] double emissiveScale(const Image<glm::vec3>& emissive);
+/// Says of which objects the one scale of a texture (AtlasTexture::scale) is too coarse, since
+/// others have longer splats or more light: once each, whatever the page and the frame.
+void noteCoarseScales(const Atlas& atlas, const std::vector<AtlasTexture>& textures, Job& job);
+
 /// Interleaved RGB of glTF's metallicRoughnessTexture: G = roughness, B = metallic, and R = 255,
 /// "not occluded" where an engine takes it for that, wherever one of the two is not 0.
 [[nodiscard]] std::vector<std::uint8_t> bytesOf(const Image<glm::vec2>& metallicRoughness);

@@ -197,6 +197,7 @@ void makeViewable(Bundle& bundle, Job& job) {
 Result<Atlas> packForPage(const Bundle& bundle, Job& job) {
     PackSettings settings;
     settings.layout = PackSettings::Layout::tight;
+    settings.unmeasuredPixels = 0;  // a page has these behind all else, or says that it has not
     Result<Atlas> atlas = Atlas();
     for (const int side : kSides) {
         settings.maxSize = side;
@@ -225,7 +226,8 @@ Result<std::vector<PageImages>> PageScene::add(const Atlas& atlas, Job& job) {
             return fail(ErrorCode::invalidInput, "the depth of a page has 8 or 16 bits, not 32");
         pruned_ = pruned_ || view.pruned;
         Json v = pageCamera(view.camera, view.name);
-        v["noDepth"] = nameOf(view.noDepth);
+        // For what no rectangle shows: of a masked view that is empty.
+        v["noDepth"] = nameOf(view.masked.value_or(false) ? NoDepth::empty : view.noDepth);
         v["pruned"] = view.pruned;
         v["nearPlane"] = view.nearPlane;
         v["farPlane"] = view.farPlane;

@@ -89,6 +89,10 @@ struct ViewHeader {
     int depthBits = 16;
     /// Of a mesh: empty; of a photograph whose depth was measured: mostly unknown.
     NoDepth noDepth = NoDepth::empty;
+    /// In an atlas, of a view with NoDepth::unknown: whether the whole view is masked as
+    /// lacksDepthByMask() says (lib/packing/packing.hpp), of which rectangles show a part. Nothing:
+    /// that is not known, or all of the view is there.
+    std::optional<bool> masked{};
     /// Depth was taken away where other views show the same (see prune()). Those pixels have full
     /// alpha and are unknown, whatever noDepth says.
     bool pruned = false;

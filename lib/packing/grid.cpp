@@ -53,6 +53,22 @@ struct CellGrid {
     }
 };
 
+/// The smallest page of sides 2^N that holds so many views, of equal ones the squarest and then the
+/// wider, and the columns for it. They must fit on `most`, which has such sides.
+glm::ivec2 powerOfTwoPage(std::int64_t views, glm::ivec2 most, CellGrid& grid) {
+    for (int bits = 0;; ++bits) {
+        for (int more = bits % 2; more <= bits; more += 2) {
+            const std::int64_t longer = std::int64_t{1} << (bits + more) / 2,
+                               shorter = std::int64_t{1} << (bits - more) / 2;
+            for (const glm::i64vec2 size :
+                 {glm::i64vec2(longer, shorter), glm::i64vec2(shorter, longer)}) {
+                if (size.x > most.x || size.y > most.y) continue;
+                if (grid.fit(views, size)) return size;
+            }
+        }
+    }
+}
+
 /// A grid for each object, each on one page.
 Result<AtlasLayout> gridsLayout(const Bundle& bundle, const PackSettings& settings, int maxPages) {
     constexpr std::int64_t kMostSide = 65535;
@@ -92,10 +108,12 @@ Result<AtlasLayout> gridLayout(const Bundle& bundle, const PackSettings& setting
     for (int pages = 1; pages <= maxPages; ++pages) {
         const std::int64_t perPage = ceilDiv(views, pages);
         if (!grid.fit(perPage, most)) continue;
-        const glm::ivec2 size = exact ? settings.size : glm::ivec2(grid.sizeOf(perPage));
+        const glm::ivec2 size = exact                 ? settings.size
+                                : settings.powerOfTwo ? powerOfTwoPage(perPage, most, grid)
+                                                      : glm::ivec2(grid.sizeOf(perPage));
         AtlasLayout layout;
-        layout.width = settings.powerOfTwo ? powerOfTwoFrom(size.x) : size.x;
-        layout.height = settings.powerOfTwo ? powerOfTwoFrom(size.y) : size.y;
+        layout.width = size.x;
+        layout.height = size.y;
         layout.pages = static_cast<int>(ceilDiv(views, perPage));
         for (std::int64_t i = 0; i < views; ++i) {
             AtlasRectangle r =

@@ -18,6 +18,10 @@ struct AtlasLayout {
 /// Points, and pixels of full alpha without a distance.
 [[nodiscard]] std::int64_t objectPixels(const ReferenceView& view);
 
+/// Pixels of full alpha without a distance that nobody took away: of views that fill their frames,
+/// with unknown depth, not pruned and no background; of others 0.
+[[nodiscard]] std::int64_t unmeasuredPixels(const ReferenceView& view);
+
 /// The least power of two that is not below, of 1 .. 2^30.
 [[nodiscard]] int powerOfTwoFrom(int size);
 /// The largest page that the settings allow.

@@ -184,6 +184,13 @@ void dropIfZero(Image<T>& image) {
 
 }  // namespace
 
+std::int64_t unmeasuredPixels(const ReferenceView& view) {
+    if (view.noDepth != NoDepth::unknown || view.pruned || view.background ||
+        lacksDepthByMask(view))
+        return 0;
+    return objectPixels(view) - view.pointCount();
+}
+
 std::int64_t objectPixels(const ReferenceView& view) {
     std::int64_t n = 0;
     for (int y = 0; y < view.depth.height(); ++y) {
@@ -205,8 +212,9 @@ struct LackingPixels {
     [[nodiscard]] bool masked() const { return empty > covered; }
 };
 
-/// The same as lacksDepthByMask(), of what an atlas keeps of a view.
-bool showsMask(const Atlas& atlas, std::size_t view) {
+/// lacksDepthByMask() of a view of an atlas; of atlases that do not say it, of what they keep.
+bool isMasked(const Atlas& atlas, std::size_t view) {
+    if (atlas.views[view].masked) return *atlas.views[view].masked;
     const Camera& camera = atlas.views[view].camera;
     LackingPixels lacking;
     for (const AtlasRectangle& r : atlas.rectangles) {
@@ -233,6 +241,10 @@ Result<void> checkSettings(const ViewTable& table, const PackSettings& settings)
         (size.x < 1 || size.y < 1 || std::max(size.x, size.y) > settings.maxSize))
         return fail(ErrorCode::usage, "textures of {}x{} are asked for; 1 to {} is possible",
                     size.x, size.y, settings.maxSize);
+    const glm::ivec2 page = settings.maxPage;
+    if (page != glm::ivec2(0) && (page.x < 1 || page.y < 1))
+        return fail(ErrorCode::usage, "the largest page is {}x{}; 1 or more is possible", page.x,
+                    page.y);
     if (table.whole()) STX_CHECK(table.about().check());
     if (settings.objects) STX_CHECK(checkObjects(*settings.objects, table.count()));
     if (!settings.contentOf) return {};
@@ -280,6 +292,20 @@ Atlas emptyAtlas(const ViewTable& table, const AtlasLayout& layout, const Conten
         atlas.pages.push_back(std::move(page));
     }
     return atlas;
+}
+
+/// Says that the tight layout leaves out colours without a depth. `found`: in views as they are.
+void noteUnmeasured(const PackSettings& settings, std::int64_t found, Job& job) {
+    const std::int64_t pixels = settings.unmeasuredPixels.value_or(found);
+    if (pixels <= 0) return;
+    constexpr const char* kSaid =
+        "pixels that have colours but no depth, the tight layout keeps only those amid others; "
+        "--layout grid keeps all";
+    // Frames have other numbers each, and one line is enough for a film.
+    if (settings.contentOf)
+        job.noteOnce(fmt::format("of {}", kSaid));
+    else
+        job.note(fmt::format("of {} {}", pixels, kSaid));
 }
 
 std::uint64_t pixelsOf(const AtlasLayout& layout) {
@@ -335,7 +361,10 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
     STX_CHECK(job.checkCancelled());
     std::vector<std::vector<const AtlasRectangle*>> ofView(count);
     for (const AtlasRectangle& r : atlas.rectangles) ofView[source[r.view]].push_back(&r);
+    const bool tight = settings.layout == PackSettings::Layout::tight;
     std::vector<std::int64_t> object(count), points(count);
+    std::vector<std::int64_t> unmeasured(count);
+    std::vector<std::optional<bool>> masked(count);
     STX_CHECK(forEachView(
         table, {"an atlas", 0}, job,
         [&](std::size_t i, const std::shared_ptr<const ReferenceView>& view) -> Result<void> {
@@ -345,8 +374,13 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
             });
             object[i] = objectPixels(*view);
             points[i] = view->pointCount();
+            if (!tight) return {};
+            unmeasured[i] = unmeasuredPixels(*view);
+            // What the rectangles leave out decides with what they show.
+            if (view->noDepth == NoDepth::unknown) masked[i] = lacksDepthByMask(*view);
             return {};
         }));
+    for (std::size_t k = 0; k < source.size(); ++k) atlas.views[k].masked = masked[source[k]];
     atlas.sourcePixels = std::reduce(object.begin(), object.end());
     if (settings.sourcePixels > 0) atlas.sourcePixels = settings.sourcePixels;
     if (settings.objects) {
@@ -354,6 +388,7 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
         for (const auto& o : atlas.objects) atlas.sourcePixels += o.sourcePixels;
     }
     atlas.keptPixels = std::reduce(points.begin(), points.end());
+    if (tight) noteUnmeasured(settings, std::reduce(unmeasured.begin(), unmeasured.end()), job);
     return atlas;
 }
 
@@ -376,7 +411,7 @@ std::vector<std::uint64_t> outsideBits(const Atlas& atlas, std::size_t of) {
     std::vector<std::uint64_t> bits(
         (static_cast<std::size_t>(camera.width) * camera.height + 63) / 64, 0);
     // Nothing is known there, wherever others look.
-    if (atlas.views[of].noDepth == NoDepth::unknown && !showsMask(atlas, of)) {
+    if (atlas.views[of].noDepth == NoDepth::unknown && !isMasked(atlas, of)) {
         std::ranges::fill(bits, ~std::uint64_t{0});
         return bits;
     }
@@ -446,6 +481,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     parallelFor(0, atlas.views.size(), [&](std::size_t i) {
         ReferenceView& view = bundle.views[i];
         view = withoutImages(atlas.views[i]);
+        view.masked.reset();  // its pixels say it
         const int width = view.camera.width, height = view.camera.height;
         view.texture = emptyTexture(width, height, contents.linear);
         view.depth = Image<float>(width, height, kNoDepth);

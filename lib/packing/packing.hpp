@@ -22,7 +22,8 @@ struct PackSettings {
         /// patches where that saves room, fitted closely, turned where that makes the textures
         /// smaller. Views without content are dropped with a note, but for frames that are packed
         /// alike. Pixels of full alpha without a depth (pruned, or missed by a sensor) are left out
-        /// and counted in Atlas::sourcePixels.
+        /// unless they lie amid others, and counted in Atlas::sourcePixels; of those that a sensor
+        /// missed a note says so.
         tight,
     };
     Layout layout = Layout::grid;
@@ -31,6 +32,8 @@ struct PackSettings {
     int maxSize = 16384;  ///< largest width and height of a texture: what a GPU takes; 1..65535
     /// Each page is exactly this large, whatever is left of it; {0, 0}: as large as is needed.
     glm::ivec2 size{0};
+    /// Largest page, where one side may be longer than the other; {0, 0}: maxSize both ways.
+    glm::ivec2 maxPage{0};
     /// Width and height of pages are powers of two, the smallest in which all fits.
     bool powerOfTwo = false;
     /// Of several models in one bundle (joinObjects()): which views are whose; null: it is one.
@@ -38,6 +41,9 @@ struct PackSettings {
     /// Object pixels before pruning (PruneReport::sourcePixels), for Atlas::sourcePixels; 0 = the
     /// points and the pixels of full alpha without a depth.
     std::int64_t sourcePixels = 0;
+    /// Pixels with colours but no depth before pruning (PruneReport::unmeasuredPixels), for the
+    /// note of the tight layout, 0: there is none; nothing: those of views that were not pruned.
+    std::optional<std::int64_t> unmeasuredPixels{};
     /// Memory that writing takes beside the pages, bytes a pixel; nothing: the most of any
     /// container.
     std::optional<std::uint64_t> bytesToWrite{};
@@ -82,8 +88,9 @@ struct JoinedObjects {
 /// rectangle shows it. Empty, as if none were set, where nothing of the object is missing: in
 /// atlases with all its pixels (keptPixels = sourcePixels), and of views that are neither pruned
 /// nor have unknown depth. Else that is where points of other views fall, a little generously, and
-/// everywhere in a view whose missing depth is unknown, unless its rectangles and their padding
-/// show that it is masked as lacksDepthByMask() says. The atlas must pass check().
+/// everywhere in a view whose missing depth is unknown, unless it is masked as lacksDepthByMask()
+/// says of the whole view (ViewHeader::masked; of older atlases: of its rectangles and their
+/// padding). The atlas must pass check().
 [[nodiscard]] std::vector<std::uint64_t> outsideBits(const Atlas& atlas, std::size_t view);
 
 /// The bundle of an atlas: every pixel of every rectangle back in its view. Pixels in no rectangle

@@ -50,15 +50,17 @@ PruneReport PackPeriod::prune(Bundle& frame) const {
     PruneReport report;
     report.sourcePoints = frame.pointCount();
     report.psnr = std::numeric_limits<double>::quiet_NaN();
-    std::vector<std::int64_t> object(frame.views.size());
+    std::vector<std::int64_t> object(frame.views.size()), unmeasured(object.size());
     parallelFor(0, frame.views.size(), [&](std::size_t k) {
         object[k] = objectPixels(frame.views[k]);
+        unmeasured[k] = unmeasuredPixels(frame.views[k]);
         Image<std::uint8_t> kept = views_[k].kept;
         for (std::size_t p = 0; p < kept.count(); ++p)
             kept.data()[p] &= hasPoint(frame.views[k].depth.data()[p]) ? 1 : 0;
         keepOnly(kept, frame.views[k]);
     });
     for (const std::int64_t n : object) report.sourcePixels += n;
+    for (const std::int64_t n : unmeasured) report.unmeasuredPixels += n;
     report.keptPixels = frame.pointCount();
     for (const auto& v : frame.views) report.emptiedViews += v.pointCount() == 0 ? 1 : 0;
     return report;

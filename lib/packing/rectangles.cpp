@@ -50,9 +50,9 @@ struct Problem {
     std::vector<int> counts;
     std::int64_t area = 0;
     std::int64_t rectangles = 0;
-    int maxSize = 0;
-    int width = 0;   ///< of the page; 0: what gives the smallest
-    int height = 0;  ///< of the page, where its width is given
+    glm::ivec2 most{0};  ///< largest page
+    int width = 0;       ///< of the page; 0: what gives the smallest
+    int height = 0;      ///< of the page, where its width is given
 
     /// Nothing better is looked for.
     [[nodiscard]] bool done(const Attempt& attempt) const {
@@ -65,10 +65,10 @@ struct Problem {
     }
 };
 
-Problem groupSizes(const std::vector<glm::ivec2>& sizes, int maxSize) {
+Problem groupSizes(const std::vector<glm::ivec2>& sizes, glm::ivec2 most) {
     std::map<std::pair<int, int>, std::vector<int>> bySize;
     Problem p;
-    p.maxSize = maxSize;
+    p.most = most;
     for (std::size_t i = 0; i < sizes.size(); ++i) {
         bySize[{sizes[i].x, sizes[i].y}].push_back(static_cast<int>(i));
         p.area += static_cast<std::int64_t>(sizes[i].x) * sizes[i].y;
@@ -85,8 +85,8 @@ Problem groupSizes(const std::vector<glm::ivec2>& sizes, int maxSize) {
 void run(const Problem& problem, Skyline& skyline, std::vector<int>& left, std::int64_t best,
          Attempt& attempt) {
     left = problem.counts;
-    const std::int64_t most = std::min<std::int64_t>(problem.maxSize, best / attempt.width);
-    const int height = skyline.fill(attempt.width, problem.maxSize, attempt.order, attempt.rule,
+    const std::int64_t most = std::min<std::int64_t>(problem.most.y, best / attempt.width);
+    const int height = skyline.fill(attempt.width, problem.most.y, attempt.order, attempt.rule,
                                     attempt.turn, static_cast<int>(most), left, nullptr);
     const bool all = std::all_of(left.begin(), left.end(), [](int n) { return n == 0; });
     attempt.height = all && height <= most ? height : 0;
@@ -122,14 +122,13 @@ std::vector<int> pageWidths(const Problem& problem, bool turn, int steps) {
         frequent.emplace_back(problem.counts[i], g.width);
         if (turn) frequent.emplace_back(problem.counts[i], g.height);
     }
-    const auto needed = static_cast<int>((problem.area + problem.maxSize - 1) / problem.maxSize);
+    const auto needed = static_cast<int>((problem.area + problem.most.y - 1) / problem.most.y);
     least = std::max(least, needed);
-    if (least > problem.maxSize) return {};
+    if (least > problem.most.x) return {};
     const double square = std::sqrt(static_cast<double>(problem.area) * 1.04);
     std::vector<int> widths;
     const auto add = [&](double w) {
-        widths.push_back(
-            std::clamp(static_cast<int>(std::min(w, 70000.0)), least, problem.maxSize));
+        widths.push_back(std::clamp(static_cast<int>(std::min(w, 70000.0)), least, problem.most.x));
     };
     add(square);
     for (int i = 0; i < steps; ++i) add(square * (0.76 + 0.56 * (i + 0.5) / steps));
@@ -147,7 +146,7 @@ std::vector<int> pageWidths(const Problem& problem, bool turn, int steps) {
             if (across > square * 0.4 && across < square * 2.5) add(across);
         }
     }
-    add(problem.maxSize);
+    add(problem.most.x);
     std::sort(widths.begin(), widths.end());
     widths.erase(std::unique(widths.begin(), widths.end()), widths.end());
     return widths;
@@ -223,7 +222,7 @@ void improve(const Problem& problem, std::int64_t work, std::uint64_t seed, Atte
         if (problem.width == 0 && random(2)) {
             const int span = std::max(best.width / 24, 2);
             const int moved = best.width + static_cast<int>(random(2 * span + 1)) - span;
-            next.width = std::clamp(moved, 1, problem.maxSize);
+            next.width = std::clamp(moved, 1, problem.most.x);
         }
         run(problem, skyline, left, best.area(), next);
         if (next.height > 0 && !best.betterThan(next)) std::swap(best, next);
@@ -275,23 +274,24 @@ RectanglePacking toPacking(const Problem& problem, int width, int height,
     return packing;
 }
 
-/// Several pages of one size, the smallest square (or the limit's) that holds all.
+/// Several pages of one size, the smallest square, as far as the limit allows one, that holds all.
 std::optional<RectanglePacking> severalPages(const Problem& problem, int pages, bool turn) {
     const auto orders = sortOrders(problem.groups);
     const auto attempt = [&](int size) -> std::optional<RectanglePacking> {
+        const glm::ivec2 page = glm::min(glm::ivec2(size), problem.most);
         for (const auto rule : {GapRule::avoidWaste, GapRule::widest, GapRule::firstFit}) {
             for (const auto& order : orders) {
-                const auto filled = fillPages(problem, size, size, pages, rule, turn, order);
-                if (!filled.empty()) return toPacking(problem, size, size, filled);
+                const auto filled = fillPages(problem, page.x, page.y, pages, rule, turn, order);
+                if (!filled.empty()) return toPacking(problem, page.x, page.y, filled);
                 if (problem.cost() > kWork / 8) break;
             }
         }
         return std::nullopt;
     };
-    auto best = attempt(problem.maxSize);
+    int holds = std::max(problem.most.x, problem.most.y);
+    auto best = attempt(holds);
     if (!best) return best;
     int fails = static_cast<int>(std::sqrt(static_cast<double>(problem.area) / pages)) - 1;
-    int holds = problem.maxSize;
     while (holds - fails > std::max(1, holds / 128)) {
         const int middle = fails + (holds - fails) / 2;
         if (auto found = attempt(middle)) {
@@ -313,7 +313,7 @@ std::optional<RectanglePacking> pagesOf(const Problem& problem, glm::ivec2 size,
     Problem fixed = problem;
     fixed.width = size.x;
     fixed.height = size.y;
-    fixed.maxSize = kLargest;
+    fixed.most = glm::ivec2(kLargest);
     for (int pages = 1; pages <= most; ++pages) {
         if (problem.area > pages * pageArea) continue;
         for (const bool turn : {false, true}) {
@@ -347,7 +347,7 @@ std::optional<RectanglePacking> powerOfTwoPages(const Problem& problem, int maxP
             while (width * width < area) width *= 2;
             const std::int64_t height = area / width;
             for (const glm::ivec2 size : {glm::ivec2(width, height), glm::ivec2(height, width)}) {
-                if (std::max(size.x, size.y) > problem.maxSize) break;
+                if (size.x > problem.most.x || size.y > problem.most.y) continue;
                 if (auto found = pagesOf(problem, size, pages, tryTurns)) return found;
                 if (size.x == size.y) break;
             }
@@ -358,9 +358,10 @@ std::optional<RectanglePacking> powerOfTwoPages(const Problem& problem, int maxP
 
 /// "1300x1290 would do", of what was refused; empty where nothing does.
 std::string whatWouldDo(const std::vector<glm::ivec2>& sizes, RectangleLimits limits) {
-    if (limits.size.x == 0 && limits.maxSize == kLargest) return {};
+    if (limits.size.x == 0 && limits.maxPage.x == 0 && limits.maxSize == kLargest) return {};
     limits.size = {0, 0};
     limits.maxSize = kLargest;
+    limits.maxPage = {0, 0};
     const auto free = packRectangles(sizes, limits);
     if (!free) return {};
     return fmt::format("; {}{}x{} would do", free->pages > 1 ? "two of " : "", free->width,
@@ -372,11 +373,15 @@ std::string whatWouldDo(const std::vector<glm::ivec2>& sizes, RectangleLimits li
 Result<RectanglePacking> packRectangles(const std::vector<glm::ivec2>& sizes,
                                         const RectangleLimits& limits) {
     const bool exact = limits.size.x > 0;
+    const bool narrowed = limits.maxPage != glm::ivec2(0);
     if (limits.maxSize < 1 || limits.maxSize > kLargest || limits.maxPages < 1 ||
-        std::max(limits.size.x, limits.size.y) > limits.maxSize)
+        std::max(limits.size.x, limits.size.y) > limits.maxSize ||
+        (narrowed && std::min(limits.maxPage.x, limits.maxPage.y) < 1))
         return fail(ErrorCode::usage, "pages of {} pixels, {} of them, cannot be packed",
                     limits.maxSize, limits.maxPages);
-    const glm::ivec2 most = exact ? limits.size : glm::ivec2(limits.maxSize);
+    const glm::ivec2 largest = narrowed ? glm::min(limits.maxPage, glm::ivec2(limits.maxSize))
+                                        : glm::ivec2(limits.maxSize);
+    const glm::ivec2 most = exact ? limits.size : largest;
     for (std::size_t i = 0; i < sizes.size(); ++i) {
         if (sizes[i].x < 1 || sizes[i].y < 1)
             return fail(ErrorCode::invalidInput, "rectangle {} is {}x{}", i, sizes[i].x,
@@ -389,22 +394,23 @@ Result<RectanglePacking> packRectangles(const std::vector<glm::ivec2>& sizes,
                         sizes[i].x, sizes[i].y, most.x, most.y, whatWouldDo(sizes, limits));
     }
     if (sizes.empty()) return RectanglePacking{limits.size.x, limits.size.y, 1, {}};
-    const Problem problem = groupSizes(sizes, limits.maxSize);
+    const Problem problem = groupSizes(sizes, largest);
 
     const bool square =
         std::all_of(sizes.begin(), sizes.end(), [](glm::ivec2 s) { return s.x == s.y; });
     const bool tryTurns = limits.mayTurn && !square;
+    const auto refused = [&] {
+        return fail(ErrorCode::invalidInput,
+                    "{} rectangles with {} pixels do not fit on {} of {}{}x{}{}",
+                    problem.rectangles, problem.area,
+                    limits.maxPages > 1 ? fmt::format("{} textures", limits.maxPages) : "a texture",
+                    exact ? "" : "at most ", most.x, most.y, whatWouldDo(sizes, limits));
+    };
     if (exact || limits.powerOfTwo) {
         auto packing = exact ? pagesOf(problem, limits.size, limits.maxPages, tryTurns)
                              : powerOfTwoPages(problem, limits.maxPages, tryTurns);
         if (packing) return *packing;
-        return fail(ErrorCode::invalidInput,
-                    "{} rectangles with {} pixels do not fit on {} of {}{}", problem.rectangles,
-                    problem.area,
-                    limits.maxPages > 1 ? fmt::format("{} textures", limits.maxPages) : "a texture",
-                    exact ? fmt::format("{}x{}", most.x, most.y)
-                          : fmt::format("at most {}x{}", most.x, most.y),
-                    whatWouldDo(sizes, limits));
+        return refused();
     }
     auto best = bestPage(problem, false, tryTurns ? kWork / 2 : kWork);
     if (tryTurns && (!best || best->area() > problem.area)) {
@@ -412,26 +418,18 @@ Result<RectanglePacking> packRectangles(const std::vector<glm::ivec2>& sizes,
         if (turned && (!best || turned->area() < best->area() - best->area() / 200)) best = turned;
     }
     if (best) {
-        const auto pages = fillPages(problem, best->width, problem.maxSize, 1, best->rule,
-                                     best->turn, best->order);
+        const auto pages =
+            fillPages(problem, best->width, problem.most.y, 1, best->rule, best->turn, best->order);
         return toPacking(problem, best->width, best->height, pages);
     }
     for (int pages = 2; pages <= limits.maxPages; ++pages) {
-        if (problem.area > static_cast<std::int64_t>(pages) * limits.maxSize * limits.maxSize)
-            continue;
+        if (problem.area > static_cast<std::int64_t>(pages) * largest.x * largest.y) continue;
         for (const bool turn : {false, true}) {
             if (turn && !tryTurns) continue;
             if (auto packing = severalPages(problem, pages, turn)) return *packing;
         }
     }
-    const double side = std::sqrt(static_cast<double>(problem.area) / limits.maxPages / 0.95);
-    return fail(
-        ErrorCode::invalidInput,
-        "{} rectangles with {} pixels need {} of about {:.0f}x{:.0f}, but textures are at most "
-        "{}x{}",
-        problem.rectangles, problem.area,
-        limits.maxPages > 1 ? fmt::format("{} pages", limits.maxPages) : "a texture",
-        std::ceil(side), std::ceil(side), limits.maxSize, limits.maxSize);
+    return refused();
 }
 
 }  // namespace stx

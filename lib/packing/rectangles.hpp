@@ -16,6 +16,8 @@ struct RectangleLimits {
     /// Of each page, exactly; {0, 0}: the smallest within maxSize.
     glm::ivec2 size{0};
     bool powerOfTwo = false;  ///< of width and height of a page, where they are free
+    /// Largest page, where one side may be longer than the other; {0, 0}: maxSize both ways.
+    glm::ivec2 maxPage{0};
 };
 
 /// Where one rectangle went.

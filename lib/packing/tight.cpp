@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <bit>
 
 #include "lib/base/parallel.hpp"
@@ -13,14 +14,19 @@ int powerOfTwoFrom(int size) {
 
 glm::ivec2 mostPage(const PackSettings& settings) {
     if (settings.size.x > 0) return settings.size;
-    const auto most = static_cast<unsigned>(settings.maxSize);
-    return glm::ivec2(static_cast<int>(settings.powerOfTwo ? std::bit_floor(most) : most));
+    const auto side = [&](int most) {
+        const int size = most > 0 ? std::min(most, settings.maxSize) : settings.maxSize;
+        return settings.powerOfTwo ? static_cast<int>(std::bit_floor(static_cast<unsigned>(size)))
+                                   : size;
+    };
+    return {side(settings.maxPage.x), side(settings.maxPage.y)};
 }
 
 RectangleLimits rectangleLimits(const PackSettings& settings, int maxPages) {
     RectangleLimits limits;
     limits.maxSize = settings.maxSize;
     limits.size = settings.size;
+    limits.maxPage = settings.maxPage;
     limits.powerOfTwo = settings.powerOfTwo;
     limits.maxPages = maxPages;
     return limits;

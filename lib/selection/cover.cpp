@@ -109,31 +109,53 @@ bool exchange(const CoverProblem& problem, std::vector<int>& chosen) {
     return changed;
 }
 
+/// The first views of a solution.
+CoverSolution firstOf(CoverSolution solution, std::size_t count) {
+    solution.chosen.resize(count);
+    solution.values.resize(count);
+    return solution;
+}
+
+/// As many views, with others in the places of some where that makes F larger.
+CoverSolution exchanged(const CoverProblem& problem, const std::vector<double>& alone,
+                        CoverSolution solution) {
+    const std::size_t count = solution.chosen.size();
+    std::vector<int> chosen = solution.chosen;
+    if (count >= problem.views.size() || !exchange(problem, chosen)) return solution;
+    CoverSolution better;
+    better.all = solution.all;
+    greedy(problem, chosen, count, std::numeric_limits<double>::infinity(), alone, better);
+    return better.values.back() > solution.values.back() ? better : solution;
+}
+
 }  // namespace
 
 CoverSolution chooseCover(const CoverProblem& problem, int most, double share) {
-    CoverSolution solution;
+    CoverSolution greedily;
     const std::size_t limit = std::min<std::size_t>(std::max(most, 0), problem.views.size());
     Best everything(problem.weights.size(), 0.0f);
     for (std::size_t v = 0; v < problem.views.size(); ++v)
         take(problem, static_cast<int>(v), everything);
-    solution.all = valueOf(problem, everything);
+    greedily.all = valueOf(problem, everything);
     const std::vector<double> alone = allGains(problem, Best(problem.weights.size(), 0.0f));
 
     std::vector<int> candidates(problem.views.size());
     std::iota(candidates.begin(), candidates.end(), 0);
     // A sum in another order may miss a share of 1 by rounding.
-    const double enough = solution.all * std::min(share, 1.0 - 1e-12);
-    greedy(problem, candidates, limit, enough, alone, solution);
-    const std::size_t count = solution.chosen.size();
-
-    std::vector<int> chosen = solution.chosen;
-    if (count < problem.views.size() && exchange(problem, chosen)) {
-        CoverSolution exchanged;
-        exchanged.all = solution.all;
-        greedy(problem, chosen, count, std::numeric_limits<double>::infinity(), alone, exchanged);
-        if (exchanged.values.back() > solution.values.back()) solution = std::move(exchanged);
+    const double enough = greedily.all * std::min(share, 1.0 - 1e-12);
+    greedy(problem, candidates, limit, enough, alone, greedily);
+    CoverSolution solution = exchanged(problem, alone, greedily);
+    // What exchanging gains is often worth a view. A share of 1 takes every view that is the best
+    // of some sample, and none is tried without.
+    while (share < 1 && solution.chosen.size() > 1 && solution.values.back() >= enough) {
+        const std::size_t less = solution.chosen.size() - 1;
+        CoverSolution fewer = firstOf(solution, less);
+        if (fewer.values.back() < enough)
+            fewer = exchanged(problem, alone, firstOf(greedily, less));
+        if (fewer.values.back() < enough) break;
+        solution = std::move(fewer);
     }
+    const std::size_t count = solution.chosen.size();
 
     // F(prefix) + the largest `count` gains beyond it bounds every choice of `count` views.
     solution.bound = std::min(solution.all, largestSum(alone, count));

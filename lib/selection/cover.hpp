@@ -28,8 +28,9 @@ struct CoverSolution {
 };
 
 /// Chooses views by lazy greedy, then exchanges chosen for unchosen ones while that helps. Stops at
-/// `most` views, or when F reaches `share` of F(all), or when no view adds anything. Ties go to the
-/// lower index; the result is the same on any number of threads.
+/// `most` views, or when F reaches `share` of F(all), or when no view adds anything. Where a share
+/// below 1 is reached, a view less is tried in the same way as long as that reaches it, too. Ties
+/// go to the lower index; the result is the same on any number of threads.
 [[nodiscard]] CoverSolution chooseCover(const CoverProblem& problem, int most, double share);
 
 }  // namespace stx

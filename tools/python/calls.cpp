@@ -51,6 +51,7 @@ py::object packBundle(const BundleModel& given, const py::dict& keywords, JobHan
         Bundle pruned = given.get();
         STX_TRY(const auto report, prune(pruned, *pruning, part));
         settings.sourcePixels = report.sourcePixels;
+        settings.unmeasuredPixels = report.unmeasuredPixels;
         return pack(pruned, settings, part);
     }));
 }

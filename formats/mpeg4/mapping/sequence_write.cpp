@@ -329,6 +329,7 @@ class SequenceWriter {
             loss_.clamped = loss_.clamped || images.clamped;
             if (images.depthClamped)
                 loss_.worstClamped = std::max(loss_.worstClamped, images.worstDepth);
+            loss_.splats = loss_.splats || images.splatsCoarse;
             track.coverageLost = track.coverageLost || images.coverageLost;
         } else {
             const auto k = static_cast<std::size_t>(&track - tracks_.data());

@@ -7,6 +7,7 @@
 #include "formats/images/images.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mapping/view_notes.hpp"
+#include "lib/model/splat_steps.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -118,6 +119,7 @@ void PictureLoss::add(std::size_t i, const ViewHeader& view, int bits, const Vie
     linear = linear || images.linear;
     clamped = clamped || images.clamped;
     coverage = coverage || images.coverageLost;
+    splats = splats || images.splatsCoarse;
 }
 
 void PictureLoss::note(const SceneWriteOptions& options, Job& job) const {
@@ -135,6 +137,11 @@ void PictureLoss::note(const SceneWriteOptions& options, Job& job) const {
     if (coverage)
         job.note(fmt::format("{} has no alpha: soft edges of the coverage are lost",
                              options.pointTexture ? "a PointTexture" : "JPEG"));
+    if (splats)
+        job.note(
+            fmt::format("splat axes of a view are coded in steps of more than {:g} % of their "
+                        "median: its codes reach to the longest axis; .exr keeps them exactly",
+                        100 * SplatSteps::kMostStep));
 }
 
 Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions& options,
@@ -193,6 +200,11 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
                 splatPng(view.splatU, out.longestSplat, options.normalBits, out.padding));
         STX_TRY(out.splatV,
                 splatPng(view.splatV, out.longestSplat, options.normalBits, out.padding));
+        const double codes = options.normalBits == 8 ? 255 : 65535;
+        SplatSteps steps(2 * out.longestSplat / codes);
+        for (const auto* axes : {&view.splatU, &view.splatV})
+            for (const glm::vec3 axis : axes->pixels()) steps.add(axis);
+        out.splatsCoarse = steps.tooCoarse();
     }
     return out;
 }

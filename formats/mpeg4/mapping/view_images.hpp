@@ -22,6 +22,7 @@ struct ViewImages {
     bool clamped = false;       ///< linear colour above 1 was cut
     bool unmeasuredLost = false;  ///< colours without a depth
     bool coverageLost = false;
+    bool splatsCoarse = false;  ///< SplatSteps::tooCoarse() of their codes
     /// Of planes of video, which have no alpha, where coverage is lost: a hash of it; else 0.
     std::size_t coverage = 0;
 };
@@ -53,7 +54,7 @@ struct PictureLoss {
     std::vector<DepthLoss> depth;  ///< of each view
     /// Of depth beyond the planes; 0: there was none.
     double worstClamped = 0;
-    bool linear = false, clamped = false, coverage = false;
+    bool linear = false, clamped = false, coverage = false, splats = false;
     /// DepthLoss::add()'s of each view, where the views have the range of a film; else empty.
     std::vector<double> ownSteps;
 

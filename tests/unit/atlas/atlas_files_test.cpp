@@ -299,6 +299,72 @@ TEST(AtlasFiles, SameBytesOnAnyNumberOfThreads) {
     EXPECT_EQ(get(folder / "many.exr"), get(folder / "one.exr"));
 }
 
+TEST(AtlasFolder, SaysWhatOneScaleIsTooCoarseFor) {
+    const TemporaryFolder folder;
+    Atlas atlas = smallAtlas(4, 16, true, false);
+    atlas.objects.resize(2);
+    for (int i = 0; i < 2; ++i) {
+        atlas.objects[i].name = i == 0 ? "jug" : "cup";
+        atlas.objects[i].firstView = 2 * i;
+        atlas.objects[i].views = 2;
+    }
+    // Half axes of 0.02 at most in both; what is said when those of the jug are so many times as
+    // long, and when it shines so brightly beside a cup of 0.2.
+    const auto said = [&](float splats, float light, const char* name) {
+        Atlas changed = atlas;
+        AtlasPage& page = changed.pages[0];
+        page.emissive = Image<glm::vec3>(page.depth.width(), page.depth.height(), glm::vec3(0));
+        for (const AtlasRectangle& r : changed.rectangles) {
+            const bool jug = r.view < 2;
+            for (int y = r.atlasY; y < r.atlasY + r.atlasHeight(); ++y) {
+                for (int x = r.atlasX; x < r.atlasX + r.atlasWidth(); ++x) {
+                    page.splatU.at(x, y) *= jug ? splats : 1.0f;
+                    page.splatV.at(x, y) *= jug ? splats : 1.0f;
+                    page.emissive.at(x, y) = glm::vec3(jug ? light : 0.2f);
+                }
+            }
+        }
+        Job job;
+        EXPECT_TRUE(writeAtlas(changed, folder / name, job));
+        return job.takeNotes();
+    };
+    using Notes = std::vector<std::string>;
+    const std::string splats =
+        "splat axes of 'cup' are coded in steps of more than 1 % of their median: one scale, that "
+        "of the longest axis, holds for a whole texture; an .exr atlas keeps them exactly";
+    const std::string light =
+        "emitted light of 'cup' is rounded by more than 2 %, even where it is brightest: one "
+        "scale, that of the brightest object, holds for a whole texture; an .exr atlas keeps it "
+        "exactly";
+    EXPECT_EQ(said(100, 2, "set"), Notes());
+    EXPECT_EQ(said(1000, 2, "set"), Notes{splats});
+    EXPECT_EQ(said(100, 500, "set"), Notes{light});
+    EXPECT_EQ(said(1000, 500, "set"), (Notes{splats, light}));
+    EXPECT_EQ(said(1000, 500, "a.exr"), Notes());
+    // One model whose own axes differ as much.
+    atlas.objects.clear();
+    EXPECT_EQ(said(1, 500, "set"), Notes());
+    atlas.pages[0].splatU.at(atlas.rectangles[0].atlasX, atlas.rectangles[0].atlasY) = {100, 0, 0};
+    const auto whole = said(1, 2, "set");
+    ASSERT_EQ(whole.size(), 1u);
+    EXPECT_EQ(whole[0].find("splat axes are coded in steps of more than 1 %"), 0u) << whole[0];
+}
+
+TEST(AtlasFiles, MaskedViewsComeBackAsSuch) {
+    const TemporaryFolder folder;
+    Atlas atlas = smallAtlas(3, 16, false, false);
+    for (ReferenceView& view : atlas.views) view.noDepth = NoDepth::unknown;
+    atlas.views[0].masked = true;
+    atlas.views[1].masked = false;
+    for (const char* name : {"set", "a.exr"}) {
+        const Atlas back = writtenAndRead(atlas, folder / name);
+        ASSERT_EQ(back.views.size(), 3u);
+        EXPECT_EQ(back.views[0].masked, std::optional(true)) << name;
+        EXPECT_EQ(back.views[1].masked, std::optional(false)) << name;
+        EXPECT_FALSE(back.views[2].masked.has_value()) << name;
+    }
+}
+
 TEST(AtlasFiles, AnAtlasReplacesAnAtlasOnly) {
     const TemporaryFolder folder;
     writtenAndRead(smallAtlas(3, 32, true, false), folder / "set");
@@ -407,6 +473,8 @@ TEST(AtlasSchema, HoldsForWhatIsWritten) {
     sheet.objects[1].name = "cup";
     sheet.objects[1].firstView = 1;
     sheet.objects[1].views = 2;
+    sheet.views[0].noDepth = NoDepth::unknown;
+    sheet.views[0].masked = true;
     ASSERT_TRUE(writeAtlas(sheet, folder / "sheet", job));
     const std::string schema = STX_SOURCE_DIR "/formats/atlas/atlas.schema.json";
     const std::string script =

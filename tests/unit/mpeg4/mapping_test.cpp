@@ -1,5 +1,6 @@
 #include "formats/mpeg4/mapping/mapping.hpp"
 
+#include <algorithm>
 #include <functional>
 #include <random>
 
@@ -127,6 +128,25 @@ TEST(Mapping, NormalsAndSplatsComeBack) {
     Job job;
     ASSERT_TRUE(sceneFromBundle(bundle, options, job));
     EXPECT_NE(job.takeNotes().at(0).find("left out"), std::string::npos);
+}
+
+TEST(Mapping, SplatsThatTheirCodesAreTooCoarseForAreSaid) {
+    Bundle bundle;
+    bundle.views = {makeView(12, 10, 16)};
+    addVectors(bundle.views[0]);  // half axes of about 0.02
+    const std::string coarse =
+        "splat axes of a view are coded in steps of more than 1 % of their median: its codes reach "
+        "to the longest axis; .exr keeps them exactly";
+    const auto isSaid = [&] {
+        Job job;
+        EXPECT_TRUE(sceneFromBundle(bundle, {}, job));
+        return std::ranges::count(job.takeNotes(), coarse) > 0;
+    };
+    EXPECT_FALSE(isSaid());
+    const auto depth = bundle.views[0].depth.pixels();
+    const auto point = std::ranges::find_if(depth, hasPoint) - depth.begin();
+    bundle.views[0].splatU.pixels()[static_cast<std::size_t>(point)] = {0, 50, 0};
+    EXPECT_TRUE(isSaid());
 }
 
 TEST(Mapping, SplatMinMaxOfPositiveRangeScalesLengths) {

@@ -136,6 +136,25 @@ TEST(Grid, NarrowTexturesTakeMoreRowsThenMorePages) {
     EXPECT_TRUE(pages->check());
 }
 
+TEST(Grid, PowersOfTwoAreTheSmallestThatHoldAll) {
+    PackSettings settings;
+    settings.powerOfTwo = true;
+    Job job;
+    const auto sizeOf = [&](int views, int width, int height) {
+        const auto atlas = pack(whiteViews(views, width, height), settings, job);
+        EXPECT_TRUE(atlas && atlas->check());
+        return atlas ? glm::ivec2(atlas->width(), atlas->height()) : glm::ivec2(0);
+    };
+    // 2x2 cells would take twice as much; of equal areas the squarest.
+    EXPECT_EQ(sizeOf(3, 126, 126), glm::ivec2(512, 256));
+    EXPECT_EQ(sizeOf(4, 126, 126), glm::ivec2(512, 512));
+    EXPECT_EQ(sizeOf(4, 124, 124), glm::ivec2(256, 256));
+    EXPECT_EQ(sizeOf(1, 1000, 20), glm::ivec2(1024, 32));
+    EXPECT_EQ(sizeOf(3, 20, 250), glm::ivec2(128, 256));
+    settings.maxSize = 300;
+    EXPECT_EQ(sizeOf(3, 100, 126), glm::ivec2(256, 256)) << "on two pages of two and one";
+}
+
 TEST(Grid, SaysWhatWouldBeNeededWhenViewsCannotFit) {
     PackSettings settings;
     settings.padding = 0;

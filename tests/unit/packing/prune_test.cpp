@@ -168,6 +168,39 @@ TEST(Prune, AHoleOfTheSensorDoesNotFillWhatIsAroundAMask) {
     }
 }
 
+TEST(Prune, ManyHolesOfTheSensorDoNotFillWhatIsAroundAMask) {
+    // Rectangles and their padding show more holes inside the mask than pixels around it.
+    Bundle bundle = torusViews();
+    for (ReferenceView& view : bundle.views) {
+        view.noDepth = NoDepth::unknown;
+        for (int y = 0; y < view.depth.height(); ++y)
+            for (int x = 0; x < view.depth.width(); ++x)
+                if (hasPoint(view.depth.at(x, y)) && (x / 6 + y / 6) % 2 == 0)
+                    view.depth.at(x, y) = kNoDepth;  // with full alpha
+        ASSERT_TRUE(lacksDepthByMask(view));
+    }
+    Job job;
+    PackSettings settings;
+    settings.layout = PackSettings::Layout::tight;
+    for (const bool pruned : {false, true}) {
+        if (pruned) {
+            const auto report = prune(bundle, {}, job);
+            ASSERT_TRUE(report) << report.error().text();
+            settings.sourcePixels = report->sourcePixels;
+        }
+        const auto atlas = pack(bundle, settings, job);
+        ASSERT_TRUE(atlas);
+        for (const ReferenceView& view : atlas->views)
+            EXPECT_TRUE(view.noDepth == NoDepth::empty || view.masked.value_or(false));
+        const auto unpacked = unpack(*atlas, job);
+        ASSERT_TRUE(unpacked);
+        for (const ReferenceView& view : unpacked->views) {
+            EXPECT_EQ(view.texture.at(0, 0).a, 0);
+            EXPECT_FALSE(view.masked.has_value()) << "that is of atlases";
+        }
+    }
+}
+
 TEST(Prune, WhatASensorMissedIsCountedBeside) {
     // Two photographs that fill their frames; the sensor missed a part of the first.
     Bundle bundle = torusViews();
@@ -179,6 +212,22 @@ TEST(Prune, WhatASensorMissedIsCountedBeside) {
     const auto pixels = static_cast<std::int64_t>(2 * bundle.views[0].depth.count());
     const auto points = bundle.pointCount();
     Job job;
+    const std::vector<std::string> said = {
+        fmt::format("of {} pixels that have colours but no depth, the tight layout keeps only "
+                    "those amid others; --layout grid keeps all",
+                    pixels - points)};
+    // The same without pruning; a grid keeps all, and so does a mask that is empty around.
+    for (const auto layout : {PackSettings::Layout::grid, PackSettings::Layout::tight}) {
+        PackSettings settings;
+        settings.layout = layout;
+        ASSERT_TRUE(pack(bundle, settings, job));
+        EXPECT_EQ(job.takeNotes(),
+                  layout == PackSettings::Layout::tight ? said : std::vector<std::string>());
+        Bundle masked = torusViews();
+        for (ReferenceView& view : masked.views) view.noDepth = NoDepth::unknown;
+        ASSERT_TRUE(pack(masked, settings, job));
+        EXPECT_TRUE(job.takeNotes().empty());
+    }
     for (const bool measured : {false, true}) {
         Bundle pruned = bundle;
         const auto report =
@@ -191,8 +240,11 @@ TEST(Prune, WhatASensorMissedIsCountedBeside) {
         PackSettings settings;
         settings.layout = PackSettings::Layout::tight;
         settings.sourcePixels = report->sourcePixels;
-        const auto atlas = pack(pruned, settings, job);
+        settings.unmeasuredPixels = report->unmeasuredPixels;
+        Job packing;
+        const auto atlas = pack(pruned, settings, packing);
         ASSERT_TRUE(atlas);
+        EXPECT_EQ(packing.takeNotes(), said);
         const auto unpacked = unpack(*atlas, job);
         ASSERT_TRUE(unpacked);
         EXPECT_EQ(unpacked->views[0].texture.at(0, 0).a, 1) << "unknown, not empty";

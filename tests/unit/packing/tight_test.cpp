@@ -112,6 +112,52 @@ TEST(Rectangles, TakePagesWhenOneIsNotEnough) {
     EXPECT_EQ(none.error().code, ErrorCode::invalidInput);
 }
 
+TEST(Rectangles, SayWhatWouldDo) {
+    // Room for them there is, but one of 84 pixels alone fits on a page of 150.
+    const std::vector<glm::ivec2> three(3, {84, 84});
+    RectangleLimits limits{150, 2, true};
+    for (const glm::ivec2 size : {glm::ivec2(0), glm::ivec2(150)}) {
+        limits.size = size;
+        const auto none = packRectangles(three, limits);
+        ASSERT_FALSE(none);
+        EXPECT_EQ(
+            none.error().message,
+            fmt::format("3 rectangles with 21168 pixels do not fit on 2 textures of {}150x150; "
+                        "84x252 would do",
+                        size.x > 0 ? "" : "at most "));
+    }
+}
+
+TEST(Rectangles, OneSideOfAPageMayBeShorter) {
+    const std::vector<glm::ivec2> three(3, {84, 84});
+    RectangleLimits limits;
+    limits.maxPages = 2;
+    const auto sizeOf = [&](glm::ivec2 most) {
+        limits.maxPage = most;
+        const auto packing = packRectangles(three, limits);
+        EXPECT_TRUE(packing);
+        if (packing) expectApart(three, *packing);
+        return packing ? glm::ivec3(packing->width, packing->height, packing->pages)
+                       : glm::ivec3(0);
+    };
+    EXPECT_EQ(sizeOf({260, 90}), glm::ivec3(252, 84, 1));
+    EXPECT_EQ(sizeOf({90, 260}), glm::ivec3(84, 252, 1));
+    const glm::ivec3 two = sizeOf({200, 90});
+    EXPECT_EQ(two.z, 2);
+    EXPECT_LE(two.x, 200);
+    EXPECT_LE(two.y, 90);
+    limits.powerOfTwo = true;
+    EXPECT_EQ(sizeOf({300, 200}), glm::ivec3(256, 128, 1));
+    limits.powerOfTwo = false;
+    limits.maxPages = 1;
+    limits.maxPage = {200, 90};
+    const auto none = packRectangles(three, limits);
+    ASSERT_FALSE(none);
+    EXPECT_EQ(none.error().message,
+              "3 rectangles with 21168 pixels do not fit on a texture of at most 200x90; 84x252 "
+              "would do");
+}
+
 TEST(Rectangles, AtTheExactLimit) {
     const auto packing = packRectangles(std::vector<glm::ivec2>(4, {512, 512}), {1024, 1, true});
     ASSERT_TRUE(packing);

@@ -74,6 +74,36 @@ TEST(Cover, StopsWhenEnoughOrNothingIsAdded) {
     EXPECT_TRUE(chooseCover({{1.0}, {{}, {}}}, 2, 1.0).chosen.empty());
 }
 
+TEST(Cover, AShareIsReachedWithTheFewest) {
+    // The largest view comes first and needs both others beside it; those alone show all.
+    CoverProblem p;
+    p.weights = {1, 1, 1, 1, 1, 1};
+    p.views = {{{1, 1.0f}, {2, 1.0f}, {3, 1.0f}, {4, 1.0f}},
+               {{0, 1.0f}, {1, 1.0f}, {2, 1.0f}},
+               {{3, 1.0f}, {4, 1.0f}, {5, 1.0f}}};
+    const auto two = chooseCover(p, 3, 0.99);
+    EXPECT_EQ(std::set<int>(two.chosen.begin(), two.chosen.end()), (std::set<int>{1, 2}));
+    EXPECT_EQ(two.values, (std::vector<double>{3, 6}));
+    EXPECT_DOUBLE_EQ(two.bound, 6) << "of two views";
+    for (unsigned seed = 0; seed < 40; ++seed) {
+        const auto random = randomProblem(seed, 9, 40);
+        const auto s = chooseCover(random, 9, 0.9);
+        ASSERT_FALSE(s.chosen.empty());
+        EXPECT_GE(s.values.back(), 0.9 * s.all);
+        EXPECT_NEAR(s.values.back(), valueOf(random, s.chosen), 1e-9);
+        double optimum = 0;
+        for (int mask = 0; mask < 1 << 9; ++mask) {
+            if (__builtin_popcount(mask) != std::ssize(s.chosen)) continue;
+            std::vector<int> some;
+            for (int v = 0; v < 9; ++v) {
+                if (mask >> v & 1) some.push_back(v);
+            }
+            optimum = std::max(optimum, valueOf(random, some));
+        }
+        EXPECT_GE(s.bound, optimum - 1e-9) << "of as many views as there are in the end";
+    }
+}
+
 TEST(Coverage, SamplesOfABundleAddUpToItsSurface) {
     // A sphere seen from six sides: each bit of surface counts once though three views see it.
     Bundle bundle;
