@@ -14,6 +14,7 @@
 #include <set>
 #include <system_error>
 
+#include "formats/files/folder_mode.hpp"
 #include "formats/files/named_files.hpp"
 #include "formats/files/shown_name.hpp"
 #include "formats/files/temporaries.hpp"
@@ -357,6 +358,7 @@ struct OutputFolder::Impl {
     fs::path temporary;
     fs::path named;   ///< as it was given to rememberTarget(); commit() may move `temporary`
     Descriptor lock;  ///< tells other runs that the temporary folder is in use
+    std::optional<FolderMode> mode;  ///< of the folder that is replaced
     bool committed = false;
     bool waits = false;  ///< as that of OutputFile
 
@@ -405,6 +407,9 @@ Result<OutputFolder> OutputFolder::create(const fs::path& target, OutputFile::Op
     impl->lock = std::move(temporary->fd);
     impl->temporary = std::move(temporary->path);
     impl->named = impl->temporary;
+    // From now on: what is written into it is for the same readers.
+    impl->mode = modeOfFolder(impl->real);
+    if (impl->mode) takeMode(*impl->mode, impl->temporary);
     rememberTarget(impl->named, named);
     return OutputFolder(std::move(impl));
 }
@@ -512,6 +517,9 @@ Result<void> OutputFolder::commit() {
             }
             f.temporary = aside;
         }
+        if (f.mode) takeWholeMode(*f.mode, f.real);
+        // Nor does the old one keep its files where nobody might write into it.
+        ::chmod(f.temporary.c_str(), S_IRWXU);
         std::error_code ec;
         fs::remove_all(f.temporary, ec);
         error = 0;
