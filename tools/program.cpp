@@ -14,6 +14,8 @@
 #include "formats/files/named_files.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/files/source_date.hpp"
+#include "formats/files/stream_names.hpp"
+#include "formats/files/temporaries.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
 #include "lib/base/whole_number.hpp"
@@ -138,8 +140,12 @@ void Program::reportError(const Error& error) {
 
 Result<void> Program::makeFolderOf(const std::filesystem::path& target) {
     namespace fs = std::filesystem;
+    // Nothing is made beside a device.
+    if (isStream(target)) return {};
     std::error_code ec;
-    const auto folder = target.parent_path().empty() ? fs::path(".") : target.parent_path();
+    // A link stays, and the file that it leads to is written beside itself.
+    STX_TRY(const fs::path real, throughLinks(target));
+    const fs::path folder = folderOf(real);
     std::vector<fs::path> missing;
     fs::path there = folder;
     while (!fs::exists(fs::symlink_status(there, ec)) && there.has_relative_path()) {
@@ -157,13 +163,19 @@ Result<void> Program::makeFolderOf(const std::filesystem::path& target) {
     if (access(there.c_str(), W_OK) != 0)
         return fail(ErrorCode::io, "cannot write '{}': the folder '{}' is not writable",
                     target.string(), there.string());
-    // The outermost first; another process may make the same ones.
-    for (auto it = missing.rbegin(); it != missing.rend(); ++it)
-        if (fs::create_directory(*it, ec))
+    // The outermost first; another process may make the same ones, or take those away that it made
+    // and left empty.
+    for (auto it = missing.rbegin(); it != missing.rend(); ++it) {
+        if (fs::create_directory(*it, ec)) {
             madeFolders_.push_back(*it);
-        else if (ec)
+            continue;
+        }
+        if (ec == std::errc::no_such_file_or_directory) fs::create_directories(*it, ec);
+        if (ec)
             return fail(ErrorCode::io, "cannot write '{}': cannot make the folder '{}': {}",
                         target.string(), it->string(), ec.message());
+    }
+    if (!common.noMkdir) mayBeMadeAgain(folder);
     return {};
 }
 
@@ -459,7 +471,7 @@ Result<void> checkTarget(const std::filesystem::path& target, Program& program) 
     STX_CHECK(program.makeFolderOf(target));
     std::error_code ec;
     if (program.common.noClobber &&
-        std::filesystem::exists(std::filesystem::symlink_status(target, ec)))
+        std::filesystem::exists(std::filesystem::symlink_status(target, ec)) && !isStream(target))
         return fail(ErrorCode::io, "'{}' exists and --no-clobber forbids to replace it",
                     target.string());
     return checkIsNotNamed(target);

@@ -73,8 +73,9 @@ class Program {
     /// (error-report.schema.json).
     [[nodiscard]] int run(const std::function<Result<int>()>& body);
 
-    /// Errors when the folder of `target` is not there and may not be made, or cannot be written.
-    /// Else makes it, and run() takes it away when nothing came to be in it.
+    /// Errors when the folder of `target`, or of the file that its link leads to, is not there and
+    /// may not be made, or cannot be written. Else makes it, and run() takes it away when nothing
+    /// came to be in it. Of a device, a pipe or an open descriptor nothing is looked at.
     [[nodiscard]] Result<void> makeFolderOf(const std::filesystem::path& target);
 
   private:

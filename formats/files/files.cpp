@@ -17,6 +17,7 @@
 #include "formats/files/folder_mode.hpp"
 #include "formats/files/named_files.hpp"
 #include "formats/files/shown_name.hpp"
+#include "formats/files/stream_names.hpp"
 #include "formats/files/temporaries.hpp"
 
 namespace stx {
@@ -178,7 +179,7 @@ struct OutputFile::Impl {
     Descriptor fd;
     fs::path temporary;   ///< empty when bytes go straight to `fd`
     Descriptor lock;      ///< of a direct one's temporary, as `fd` is of others: it is in use
-    bool direct = false;  ///< stdout or a device
+    bool direct = false;  ///< an open descriptor, as stdout, or a device
     bool committed = false;
     /// Whole: only its name is missing, until the others of OutputFiles are whole, too.
     bool waits = false;
@@ -231,10 +232,13 @@ Result<OutputFile> OutputFile::create(const fs::path& target, Options options) {
     auto impl = std::make_unique<Impl>();
     impl->target = target;
     impl->options = options;
-    if (target == "-") {
+    const bool standard = target == "-";
+    // What the caller opened is written on, where it is: opened by its name, a log would begin
+    // again, and renamed to it, a file would take the log's place.
+    if (const auto open = standard ? std::optional(STDOUT_FILENO) : descriptorNamed(target)) {
         impl->direct = true;
-        impl->target = "standard output";
-        impl->fd = Descriptor(::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3));
+        if (standard) impl->target = "standard output";
+        impl->fd = Descriptor(::fcntl(*open, F_DUPFD_CLOEXEC, 3));
         if (impl->fd.get() < 0) return failIo("write", impl->target, errno);
         return OutputFile(std::move(impl));
     }
@@ -279,20 +283,20 @@ Result<void> OutputFile::write(std::string_view text) {
     return write(std::as_bytes(std::span(text.data(), text.size())));
 }
 
-const fs::path& OutputFile::temporaryPath() const {
+Result<fs::path> OutputFile::temporaryPath() const {
     if (impl_->temporary.empty()) {
         // Bytes for stdout or a device that a library writes by name: gathered in a file, and
         // copied by commit().
-        std::error_code ec;
-        fs::path folder = fs::temp_directory_path(ec);
-        if (ec) folder = "/tmp";
+        const fs::path folder = folderOfTemporaries();
         removeStaleTemporaries(folder);
-        if (auto file = createTemporaryFile(folder)) {
-            impl_->temporary = std::move(file->path);
-            impl_->lock = std::move(file->fd);
-        } else {
-            impl_->temporary = folder / "stx-no-temporary-file";
-        }
+        auto file = createTemporaryFile(folder);
+        if (!file)
+            return fail(ErrorCode::io,
+                        "cannot write '{}': no temporary file can be made in '{}': {}; set TMPDIR "
+                        "to a folder that can be written",
+                        impl_->target.string(), folder.string(), systemText(file.error()));
+        impl_->temporary = std::move(file->path);
+        impl_->lock = std::move(file->fd);
     }
     return impl_->temporary;
 }
