@@ -27,9 +27,11 @@ namespace stx::tools {
 
 namespace {
 
+constexpr int kIndented = 2, kOneLine = -1;  // as nlohmann::json's dump() takes it
+
 /// Bytes of a name that are no UTF-8 become U+FFFD.
-std::string jsonText(const nlohmann::ordered_json& json) {
-    return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+std::string jsonText(const nlohmann::ordered_json& json, int indent) {
+    return json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace
@@ -49,7 +51,11 @@ void Program::print(std::string_view text) {
 }
 
 void Program::printJson(const nlohmann::ordered_json& json) {
-    write(jsonText(json));
+    write(jsonText(json, kIndented));
+}
+
+void Program::printJsonLine(const nlohmann::ordered_json& json) {
+    write(jsonText(json, kOneLine));
 }
 
 void Program::write(std::string_view text) {
@@ -115,7 +121,7 @@ void Program::sayNotes() {
 }
 
 Result<void> Program::writeReport(const nlohmann::ordered_json& report) {
-    return writeReportText(jsonText(report));
+    return writeReportText(jsonText(report, kIndented));
 }
 
 Result<void> Program::writeReportText(std::string_view text) {
@@ -133,8 +139,7 @@ void Program::reportError(const Error& error) {
         {"exitCode", signal != 0 ? 128 + signal : static_cast<int>(error.code)},
         {"message", textOf(error)}};
     // In one line: of many inputs the report is lines of JSON.
-    const auto written = writeReportText(
-        report.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+    const auto written = writeReportText(jsonText(report, kOneLine));
     if (!written) complain("stx: " + textOf(written.error()));
 }
 

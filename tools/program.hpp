@@ -55,6 +55,8 @@ class Program {
     void print(std::string_view text);
     /// The same for JSON: valid UTF-8, whatever the bytes of names in it are.
     void printJson(const nlohmann::ordered_json& json);
+    /// The same in one line, of which other programs can take one after the other.
+    void printJsonLine(const nlohmann::ordered_json& json);
     /// One line for a person on stderr, unless --quiet; through printable().
     void say(std::string_view line);
     /// The same, also under --quiet: for errors.
