@@ -16,6 +16,8 @@
 #include "formats/files/source_date.hpp"
 #include "formats/files/stream_names.hpp"
 #include "formats/files/temporaries.hpp"
+#include "formats/mpeg4/media_files.hpp"
+#include "formats/mpeg4/mpeg4.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
 #include "lib/base/whole_number.hpp"
@@ -415,9 +417,22 @@ std::string nearestWord(std::string_view word, const std::vector<std::string>& w
     return best;
 }
 
+namespace {
+
+/// Those of the pictures of a scene as text, which lie in a folder of their own.
+std::uint64_t bytesBeside(const std::filesystem::path& path) {
+    const auto container = mpeg4ContainerOf(path);
+    if (!container || *container == Mpeg4Container::mp4) return 0;
+    const auto real = throughLinks(path);
+    return real ? bytesOf(folderOf(*real) / mpeg4::mediaFolderName(*real)) : 0;
+}
+
+}  // namespace
+
 std::uint64_t bytesOf(const std::filesystem::path& path) {
     std::error_code ec;
-    if (std::filesystem::is_regular_file(path, ec)) return std::filesystem::file_size(path, ec);
+    if (std::filesystem::is_regular_file(path, ec))
+        return std::filesystem::file_size(path, ec) + bytesBeside(path);
     std::uint64_t sum = 0;
     if (frameName(path.string(), 0))
         if (const auto files = numberedFiles(path.string()))

@@ -113,7 +113,7 @@ class Program {
 [[nodiscard]] std::string humanSeconds(double seconds);
 /// The nearest of `words` to `word`, or empty when none is near.
 [[nodiscard]] std::string nearestWord(std::string_view word, const std::vector<std::string>& words);
-/// Size of a file, or of all files in a folder.
+/// Size of a file, or of all files in a folder; of a scene as text its pictures beside it included.
 [[nodiscard]] std::uint64_t bytesOf(const std::filesystem::path& path);
 /// Whether an output is there: a file or a folder, or one of the files of a numbered name.
 [[nodiscard]] bool isThere(const std::string& output);
