@@ -104,8 +104,7 @@ class Program {
 /// A direction: "X,Y,Z", or an axis: "Z", "-Y". Errors (usage) also when it has no length.
 [[nodiscard]] Result<glm::dvec3> parseDirection(std::string_view text, std::string_view option);
 
-/// Error::text() with each file named once: what knows a file's name says it, and so does its
-/// caller.
+/// textNamingOnce(), for what people read.
 [[nodiscard]] std::string textOf(const Error& error);
 /// "1.2 MB", for messages.
 [[nodiscard]] std::string humanBytes(std::uint64_t bytes);
