@@ -400,9 +400,9 @@ std::string_view withoutComment(std::string_view line) {
     std::error_code ec;
     for (auto hash = line.find('#'); hash != line.npos; hash = line.find('#', hash + 1)) {
         if (hash > 0 && kBlanks.find(line[hash - 1]) == kBlanks.npos) continue;
+        if (fs::exists(line, ec)) return line;
         const auto last = line.substr(0, hash).find_last_not_of(kBlanks);
-        if (last == line.npos) return {};
-        return fs::exists(line, ec) ? line : line.substr(0, last + 1);
+        return last == line.npos ? std::string_view() : line.substr(0, last + 1);
     }
     return line;
 }
@@ -429,7 +429,9 @@ Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& in
             if (line.find('\0') != std::string_view::npos)
                 return fail(ErrorCode::invalidInput,
                             "'{}' holds zero bytes; a list is text, one name in each line", list);
-            if (line = withoutComment(line); !line.empty()) names.emplace_back(line);
+            // Of a list every line is a file's name: standard input is named by a word alone.
+            if (line = withoutComment(line); !line.empty())
+                names.emplace_back(line == "-" ? "./-" : line);
             at = end + 1;
         }
         if (names.size() == before)

@@ -34,7 +34,7 @@ void addJobsOption(Command command, BatchOptions& options);
 
 /// Replaces `@list.txt` by the names in that file (`@-`: in stdin), one in each line, relative to
 /// the current folder; empty lines and what follows a # that begins a line or comes after a blank
-/// are passed over, but for names that exist with it. Errors: io;
+/// are passed over, but for names that exist with it; `-` is a file of that name. Errors: io;
 /// (invalidInput) a list without a name; (usage) no input at all, or an output of the command that
 /// would take the place of one.
 [[nodiscard]] Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs,

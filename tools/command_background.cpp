@@ -187,6 +187,7 @@ Result<int> backgroundOfBundle(const BackgroundOptions& o, const Command& comman
         return fail(ErrorCode::usage, "{} inputs for '{}'; one bundle with time is expected",
                     o.inputs.size(), o.output);
     STX_CHECK(checkTarget(o.output, program));
+    const std::uint64_t inputBytes = bytesOf(o.inputs[0]);  // before the output takes its place
     preloadCodecs(o.inputs[0]);
     OpenOptions open;
     open.set.strict = o.strict;
@@ -221,10 +222,10 @@ Result<int> backgroundOfBundle(const BackgroundOptions& o, const Command& comman
     if (!o.video.empty()) save.h264 = o.crf.value_or(18);
     STX_CHECK(saveSequence(*frames, o.output, save, program.job));
     if (o.video.empty() && holdsVideo(o.inputs[0], program.job))
-        program.job.note(fmt::format(
-            "the video of '{}' ({}) is written as pictures ({}), without further loss; "
-            "--video h264 writes video",
-            o.inputs[0], humanBytes(bytesOf(o.inputs[0])), humanBytes(bytesOf(o.output))));
+        program.job.note(
+            fmt::format("the video of '{}' ({}) is written as pictures ({}), without further loss; "
+                        "--video h264 writes video",
+                        o.inputs[0], humanBytes(inputBytes), humanBytes(bytesOf(o.output))));
     const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} → {} ({}), {} of {}, {}",

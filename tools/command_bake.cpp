@@ -25,6 +25,7 @@ struct BakeOptions {
 
 Result<int> bakeBundle(const BakeOptions& o, Program& program) {
     const Stopwatch watch;
+    const std::uint64_t inputBytes = bytesOf(o.input);  // before the output takes its place
     STX_CHECK(checkTarget(o.output, program));
     STX_TRY(const auto container, containerOf(o.output));
     preloadCodecs(o.input);
@@ -59,7 +60,7 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
     program.sayNotes();
     program.say(fmt::format(
         "{} ({}) → {} ({}), {} with normals and splats, {}",
-        std::filesystem::path(o.input).filename().string(), humanBytes(bytesOf(o.input)),
+        std::filesystem::path(o.input).filename().string(), humanBytes(inputBytes),
         std::filesystem::path(o.output).filename().string(), humanBytes(bytesOf(o.output)),
         counted(tally.views(), "view") +
             (timeline.moves() ? " of " + counted(timeline.count(), "frame") : std::string()),

@@ -232,6 +232,7 @@ Result<nlohmann::ordered_json> convertOne(const BatchItem& item, const ConvertOp
                                           Program& program) {
     const Stopwatch watch;
     const std::filesystem::path input = item.input, target = item.output;
+    const std::uint64_t inputBytes = bytesOf(input);  // before the output takes its place
     STX_CHECK(checkTarget(target, program));
     STX_CHECK(containerOf(target));
     if (o.frameGiven)
@@ -272,7 +273,7 @@ Result<nlohmann::ordered_json> convertOne(const BatchItem& item, const ConvertOp
     const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} ({}) → {} ({}){}, {}", input.filename().string(),
-                            humanBytes(bytesOf(input)), target.filename().string(),
+                            humanBytes(inputBytes), target.filename().string(),
                             humanBytes(bytesOf(target)), sizes, humanSeconds(seconds)));
     nlohmann::ordered_json entry{{"input", input.string()},  {"output", target.string()},
                                  {"status", "ok"},           {"exitCode", 0},

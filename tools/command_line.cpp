@@ -97,21 +97,36 @@ Error unknownCommand(const std::string& name, const std::vector<std::string>& kn
             {}};
 }
 
-/// What an option names; of a list, @LIST, its file.
+/// A value as the name of a file; of a list, @LIST, that of its own.
+std::string pathOfValue(const std::string& value) {
+    return value.substr(value.starts_with('@') ? 1 : 0);
+}
+
+/// What an option names.
 void addNamedPaths(const CLI::Option& option, const std::string& replaces,
                    std::vector<NamedPath>& to) {
     if (option.count() == 0) return;
     const std::string name = option.get_positional() ? "" : optionRow(option).names.front();
     for (const std::string& text : option.reduced_results())
-        to.push_back({name, text.substr(text.starts_with('@') ? 1 : 0), replaces});
+        to.push_back({name, pathOfValue(text), replaces});
+}
+
+/// Whether it stands alone and names inputs: it is no word from a list.
+bool namesInputs(const CLI::Option& option) {
+    return option.get_positional() && optionRow(option).choices.empty();
+}
+
+/// Whether its values name files or folders.
+bool namesPath(const CLI::Option& option, const PathOptions& paths) {
+    return namesInputs(option) || std::ranges::find(paths.inputs, &option) != paths.inputs.end() ||
+           std::ranges::find(paths.outputs, &option) != paths.outputs.end();
 }
 
 /// The inputs that stand alone.
 std::vector<NamedPath> positionalsOf(const CLI::App& app) {
     std::vector<NamedPath> inputs;
-    for (const CLI::Option* option : app.get_options([](const CLI::Option* o) {
-             return o->get_positional() && optionRow(*o).choices.empty();
-         }))
+    for (const CLI::Option* option :
+         app.get_options([](const CLI::Option* o) { return namesInputs(*o); }))
         addNamedPaths(*option, "", inputs);
     return inputs;
 }
@@ -145,6 +160,7 @@ Result<void> checkPaths(const CLI::App& app, const std::vector<NamedPath>& input
         STX_CHECK(checkReportName(output.path));
         for (const auto& folders : {inputs, outputs})
             STX_CHECK(checkReportIsNoMainFile(output.path, folders));
+        STX_CHECK(checkReportIsBeside(output.path, outputs));
     }
     return {};
 }
@@ -375,9 +391,11 @@ std::string Command::jobOf(const std::vector<std::string>& without) const {
             continue;
         // A zero ends a word, as none can hold it.
         all += names.front() + '\0';
-        // Of paths the name: machines may have copies in folders of their own.
+        // Of paths the name: machines may have copies in folders of their own. A slash in another
+        // value is of the value (--fps 30000/1001).
+        const bool path = namesPath(*option, *paths_);
         for (const std::string& value : option->results())
-            all += value.substr(value.rfind('/') + 1) + '\0';
+            all += (path ? lastName(pathOfValue(value)) : value) + '\0';
     }
     return fmt::format("{:016x}", hashOf(std::as_bytes(std::span(all))));
 }
@@ -467,17 +485,20 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
 
 namespace {
 
-/// What the words beside --report may name.
+/// What the words beside --report may name. What -o names has that option's name.
 std::vector<NamedPath> othersOf(const std::vector<std::string_view>& words) {
     std::vector<NamedPath> others;
     for (std::size_t i = 1; i < words.size(); ++i) {
         std::string_view word = words[i];
         if (word.starts_with("--report") || words[i - 1] == "--report") continue;
+        const bool output = words[i - 1] == "-o" || words[i - 1] == "--output" ||
+                            word.starts_with("--output=") ||
+                            (word.starts_with("-o") && word.size() > 2);
         if (word.starts_with("--"))
             word.remove_prefix(std::min(word.find('='), word.size() - 1) + 1);
         else if (word.starts_with('-') || word.starts_with('@'))
             word.remove_prefix(word.starts_with('@') ? 1 : std::min<std::size_t>(2, word.size()));
-        others.push_back({"", std::string(word)});
+        others.push_back({output ? "-o" : "", std::string(word)});
     }
     return others;
 }

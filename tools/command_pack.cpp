@@ -26,7 +26,8 @@ constexpr PeakMemory kPacking = {peak::kAtlas.what, peak::kAtlas.perPixel + 4};
 
 struct PackOptions {
     std::vector<std::string> inputs;
-    std::string input, output;  ///< of one
+    std::string input, output;     ///< of one
+    std::uint64_t inputBytes = 0;  ///< before the output takes its place
     std::vector<std::string> names;
     std::string size;
     OpenOptions open;
@@ -185,9 +186,8 @@ Result<Packed> packViews(const PackOptions& o, std::unique_ptr<ViewTable> views,
 /// The notes, a line for each atlas, and of one alone the report.
 Result<void> tell(const PackOptions& o, const std::vector<Packed>& atlases, Program& program) {
     program.sayNotes();
-    const std::string input =
-        fmt::format("{} ({})", std::filesystem::path(o.input).filename().string(),
-                    humanBytes(bytesOf(o.input)));
+    const std::string input = fmt::format(
+        "{} ({})", std::filesystem::path(o.input).filename().string(), humanBytes(o.inputBytes));
     for (const Packed& p : atlases)
         program.say(fmt::format("{} → {} ({}), {}, {}", input, p.output,
                                 humanBytes(bytesOf(p.output)), p.text, humanSeconds(p.seconds)));
@@ -438,6 +438,7 @@ Result<int> packInput(const PackOptions& options, const Command& command, Progra
     if (!o.budget.empty()) STX_SET(o.pruning.budget, parsePixels(o.budget));
     if (o.inputs.size() > 1 || !o.names.empty()) return packSheet(o, command, program);
     o.input = o.inputs.front();
+    o.inputBytes = bytesOf(o.input);
     preloadCodecs(o.input);
     STX_TRY(auto frames, openSequence(o.input, openOptions(o), program.job));
     // One atlas for each frame is made in two passes.

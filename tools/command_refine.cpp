@@ -92,6 +92,7 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
         STX_CHECK(
             command.refuse({"--with", "--without"}, "does not go with --only; give one of them"));
     STX_TRY(const auto settings, RefineSettings::from(stepsOf(o)));
+    const std::uint64_t inputBytes = bytesOf(o.input);  // before the output takes its place
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(containerOf(o.output));
     preloadCodecs(o.input);
@@ -142,7 +143,7 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
     program.sayNotes();
     program.say(fmt::format(
         "{} ({}) → {} ({}), {}: {}, {}", std::filesystem::path(o.input).filename().string(),
-        humanBytes(bytesOf(o.input)), std::filesystem::path(o.output).filename().string(),
+        humanBytes(inputBytes), std::filesystem::path(o.output).filename().string(),
         humanBytes(bytesOf(o.output)),
         counted(views, "view") +
             (timeline.moves() ? " of " + counted(timeline.count(), "frame") : std::string()),

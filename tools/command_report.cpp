@@ -16,6 +16,17 @@ struct ReportOptions {
     std::vector<std::string> files, inputs;
 };
 
+/// A name as a line of a list that is read as that name, see expandInputs(). `option` is for the
+/// message. Errors (invalidInput): it has a line end.
+Result<std::string> lineOf(const std::string& name, const char* option) {
+    if (name.find('\n') != std::string::npos || name.ends_with('\r'))
+        return fail(ErrorCode::invalidInput,
+                    "{}: the name '{}' holds the end of a line, and a list has one name in each "
+                    "line; rename it",
+                    option, name);
+    return name + "\n";
+}
+
 /// The list of what is to be done again: missing and failed inputs, a line each.
 Result<std::string> listOfRest(const MergedReport& merged, const std::vector<std::string>& names) {
     std::vector<std::size_t> rest = merged.failed();
@@ -24,7 +35,11 @@ Result<std::string> listOfRest(const MergedReport& merged, const std::vector<std
         for (std::size_t i = gap.first; i <= gap.last; ++i) rest.push_back(i);
     std::ranges::sort(rest);
     std::string text;
-    for (const std::size_t index : rest) text += names[index] + "\n";
+    for (const std::size_t index : rest) {
+        STX_TRY(const auto line, lineOf(names[index], "--missing"));
+        // A line that begins with # is a comment where the file is not there.
+        text += (line.starts_with('#') ? "./" : "") + line;
+    }
     return text;
 }
 
@@ -47,24 +62,29 @@ Result<int> report(const ReportOptions& o, const Command& command, Program& prog
     if (merged.total() == 0)
         return fail(ErrorCode::invalidInput, "no report tells of an input or a picture");
     if (!names.empty()) STX_CHECK(merged.checkInputs(names));
+    // What cannot be listed is an error before anything is written.
+    std::string rest, outputs;
+    if (!o.missing.empty()) STX_SET(rest, listOfRest(merged, names));
+    if (!o.outputs.empty()) {
+        STX_TRY(const auto made, merged.outputs());
+        for (const auto& name : made) {
+            STX_TRY(const auto line, lineOf(name, "--outputs"));
+            outputs += line;
+        }
+    }
     if (!o.output.empty()) {
         const std::string text = merged.text();
         STX_CHECK(writeFile(o.output, std::as_bytes(std::span(text)), program.outputOptions()));
     }
-    if (!o.missing.empty()) {
-        STX_TRY(const auto text, listOfRest(merged, names));
-        STX_CHECK(writeFile(o.missing, std::as_bytes(std::span(text)), program.outputOptions()));
-    }
-    if (!o.outputs.empty()) {
-        std::string text;
-        for (const auto& name : merged.outputs()) text += name + "\n";
-        STX_CHECK(writeFile(o.outputs, std::as_bytes(std::span(text)), program.outputOptions()));
-    }
+    if (!o.missing.empty())
+        STX_CHECK(writeFile(o.missing, std::as_bytes(std::span(rest)), program.outputOptions()));
+    if (!o.outputs.empty())
+        STX_CHECK(writeFile(o.outputs, std::as_bytes(std::span(outputs)), program.outputOptions()));
     for (const auto& run : merged.failedRuns())
         program.job.note("a run ended before its work: " + run);
     const auto counts = merged.counts();
     const char* what = merged.ofPictures() ? "pictures" : "inputs";
-    const bool whole = merged.missingCount() == 0 && counts.failed == 0;
+    const bool whole = merged.missingCount() == 0 && counts.failed == 0 && counts.breakRules == 0;
     const auto gaps = merged.missing();
     if (program.common.format == "json") {
         auto list = nlohmann::ordered_json::array();
@@ -76,11 +96,15 @@ Result<int> report(const ReportOptions& o, const Command& command, Program& prog
                            {"skipped", counts.skipped},
                            {"failed", counts.failed},
                            {"missing", merged.missingCount()},
+                           {"breakRules", counts.breakRules},
                            {"gaps", std::move(list)}});
     } else {
-        std::string text =
-            fmt::format("{} {}: {} done, {} skipped, {} failed, {} missing\n", merged.total(), what,
-                        counts.ok, counts.skipped, counts.failed, merged.missingCount());
+        std::string text = fmt::format(
+            "{} {}: {} done, {} skipped, {} failed, {} missing{}\n", merged.total(), what,
+            counts.ok, counts.skipped, counts.failed, merged.missingCount(),
+            counts.breakRules == 0   ? ""
+            : counts.breakRules == 1 ? ", 1 breaks rules"
+                                     : fmt::format(", {} break rules", counts.breakRules));
         std::size_t named = 0;
         for (const auto& gap : gaps)
             for (std::size_t i = gap.first; i <= gap.last && named < kMostNamed; ++i, ++named)
@@ -99,12 +123,13 @@ void addReport(CommandLine& line, Program& program) {
     Command c = line.add(
         "report",
         "Joins the reports of shards and tells what is missing; exit code 7 when something is "
-        "missing or failed\n\n"
+        "missing or failed, or a file breaks rules\n\n"
         "  stx report merge shard_*.jsonl -o all.jsonl\n"
         "  stx report merge shard_*.jsonl --inputs @list.txt --missing rest.txt");
     auto o = std::make_shared<ReportOptions>();
     c.option("ACTION", o->action, "What to do").required().oneOf({"merge"});
-    c.option("REPORTS", o->files, "Reports of 'stx convert' or 'stx render', made with --shard")
+    c.option("REPORTS", o->files,
+             "Reports of 'stx convert', 'stx validate' or 'stx render', made with --shard")
         .required();
     c.option("-o,--output", o->output, "Write the joined report").writes("FILE");
     c.option("--inputs", o->inputs, "The inputs as they were given to 'stx convert', for names")

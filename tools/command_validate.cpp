@@ -69,9 +69,8 @@ void printEntry(const Json& entry, bool named, Program& program) {
                      {"valid", entry.value("valid", false)},
                      {"findings", std::move(findings)}};
     if (failed) document["error"] = entry.value("message", "");
-    // Of several files a line each, that other programs can take one after the other.
     if (named)
-        program.print(document.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+        program.printJsonLine(document);
     else
         program.printJson(document);
 }

@@ -32,12 +32,16 @@ Result<SplatCloud> splatsOfTable(const ViewTable& table, const std::string& outp
     const PeakMemory& takes = settings.most > 0 ? peak::kFewerSplats : peak::kSplats;
     const std::uint64_t limit = job.limits.maxMemoryBytes, inMemory = memoryOfAll(table, takes);
     std::unique_ptr<FileSpool> spool;
-    if (inMemory > limit && memoryOfSpooledSplats(table, job.limits, settings.most) <= limit) {
+    const std::uint64_t spooled = memoryOfSpooledSplats(table, job.limits, settings.most);
+    if (inMemory > limit && spooled <= limit) {
         STX_TRY(spool, FileSpool::create(folderOf(output), limit / kSpoolPart));
     } else {
         std::uint64_t pixels = 0;
         for (std::size_t i = 0; i < table.count(); ++i) pixels += table.pixelsOf(i);
-        STX_CHECK(checkPeak({takes.what, 0}, pixels, 0, inMemory, job.limits));
+        // The lesser of the two is enough. Of a higher limit the spool has its part, too.
+        const std::uint64_t beside = spooled - limit / kSpoolPart;
+        const std::uint64_t enough = std::min(inMemory, beside + beside / (kSpoolPart - 1));
+        STX_CHECK(checkPeak({takes.what, 0}, pixels, 0, enough, job.limits));
     }
     return splatsOfViews(table, settings, spool.get(), job);
 }

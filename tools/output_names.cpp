@@ -179,6 +179,21 @@ Result<void> checkReportIsNoMainFile(const std::string& report,
     return {};
 }
 
+Result<void> checkReportIsBeside(const std::string& report, const std::vector<NamedPath>& outputs) {
+    const fs::path file = wholePath(report);
+    for (const NamedPath& output : outputs) {
+        if (output.option != "-o" || isStandardOutput(output.path)) continue;
+        const fs::path folder = wholePath(output.path);
+        for (fs::path up = file.parent_path(); up.has_relative_path(); up = up.parent_path())
+            if (up == folder)
+                return fail(ErrorCode::usage,
+                            "--report '{}' is in -o '{}', which is replaced as a whole; give a "
+                            "name beside it",
+                            report, output.path);
+    }
+    return {};
+}
+
 Result<void> checkReportName(std::string_view path) {
     if (const auto ending = endingOfMedia(path); !ending.empty())
         return fail(
@@ -191,6 +206,7 @@ Result<void> checkReportName(std::string_view path) {
 
 bool mayHoldReport(const std::string& report, const std::vector<NamedPath>& others) {
     return checkReportName(report) && checkReportIsNoMainFile(report, others) &&
+           checkReportIsBeside(report, others) &&
            std::ranges::none_of(others, [&](auto& o) { return samePath(o.path, report); });
 }
 

@@ -62,11 +62,17 @@ void rememberInputs(const std::vector<NamedPath>& inputs, const std::vector<Name
 [[nodiscard]] Result<void> checkReportIsNoMainFile(const std::string& report,
                                                    const std::vector<NamedPath>& folders);
 
+/// Error (usage) where a report would be in the folder that -o names. That folder is replaced as a
+/// whole, and the next run would find a file in it that it does not write.
+[[nodiscard]] Result<void> checkReportIsBeside(const std::string& report,
+                                               const std::vector<NamedPath>& outputs);
+
 /// Error (usage) where a report's name ends like that of a picture, a film, a scene or a model: it
 /// would take the place of one, perhaps of a texture that the input names.
 [[nodiscard]] Result<void> checkReportName(std::string_view path);
 
-/// Whether a mistake may be reported there: neither error above, and none of `others` is the file.
+/// Whether a mistake may be reported there: none of the errors above, and none of `others` is the
+/// file.
 [[nodiscard]] bool mayHoldReport(const std::string& report, const std::vector<NamedPath>& others);
 
 /// ".png", where a name ends like the file of a picture, a film, a scene, a model or an archive;

@@ -14,6 +14,11 @@
 #include "formats/files/named_files.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/files/source_date.hpp"
+#include "formats/files/stream_names.hpp"
+#include "formats/files/temporaries.hpp"
+#include "formats/mpeg4/media_files.hpp"
+#include "formats/mpeg4/mpeg4.hpp"
+#include "lib/base/error_text.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
 #include "lib/base/whole_number.hpp"
@@ -25,9 +30,11 @@ namespace stx::tools {
 
 namespace {
 
+constexpr int kIndented = 2, kOneLine = -1;  // as nlohmann::json's dump() takes it
+
 /// Bytes of a name that are no UTF-8 become U+FFFD.
-std::string jsonText(const nlohmann::ordered_json& json) {
-    return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+std::string jsonText(const nlohmann::ordered_json& json, int indent) {
+    return json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace
@@ -47,7 +54,11 @@ void Program::print(std::string_view text) {
 }
 
 void Program::printJson(const nlohmann::ordered_json& json) {
-    write(jsonText(json));
+    write(jsonText(json, kIndented));
+}
+
+void Program::printJsonLine(const nlohmann::ordered_json& json) {
+    write(jsonText(json, kOneLine));
 }
 
 void Program::write(std::string_view text) {
@@ -113,7 +124,7 @@ void Program::sayNotes() {
 }
 
 Result<void> Program::writeReport(const nlohmann::ordered_json& report) {
-    return writeReportText(jsonText(report));
+    return writeReportText(jsonText(report, kIndented));
 }
 
 Result<void> Program::writeReportText(std::string_view text) {
@@ -131,15 +142,18 @@ void Program::reportError(const Error& error) {
         {"exitCode", signal != 0 ? 128 + signal : static_cast<int>(error.code)},
         {"message", textOf(error)}};
     // In one line: of many inputs the report is lines of JSON.
-    const auto written = writeReportText(
-        report.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+    const auto written = writeReportText(jsonText(report, kOneLine));
     if (!written) complain("stx: " + textOf(written.error()));
 }
 
 Result<void> Program::makeFolderOf(const std::filesystem::path& target) {
     namespace fs = std::filesystem;
+    // Nothing is made beside a device.
+    if (isStream(target)) return {};
     std::error_code ec;
-    const auto folder = target.parent_path().empty() ? fs::path(".") : target.parent_path();
+    // A link stays, and the file that it leads to is written beside itself.
+    STX_TRY(const fs::path real, throughLinks(target));
+    const fs::path folder = folderOf(real);
     std::vector<fs::path> missing;
     fs::path there = folder;
     while (!fs::exists(fs::symlink_status(there, ec)) && there.has_relative_path()) {
@@ -157,13 +171,19 @@ Result<void> Program::makeFolderOf(const std::filesystem::path& target) {
     if (access(there.c_str(), W_OK) != 0)
         return fail(ErrorCode::io, "cannot write '{}': the folder '{}' is not writable",
                     target.string(), there.string());
-    // The outermost first; another process may make the same ones.
-    for (auto it = missing.rbegin(); it != missing.rend(); ++it)
-        if (fs::create_directory(*it, ec))
+    // The outermost first; another process may make the same ones, or take those away that it made
+    // and left empty.
+    for (auto it = missing.rbegin(); it != missing.rend(); ++it) {
+        if (fs::create_directory(*it, ec)) {
             madeFolders_.push_back(*it);
-        else if (ec)
+            continue;
+        }
+        if (ec == std::errc::no_such_file_or_directory) fs::create_directories(*it, ec);
+        if (ec)
             return fail(ErrorCode::io, "cannot write '{}': cannot make the folder '{}': {}",
                         target.string(), it->string(), ec.message());
+    }
+    if (!common.noMkdir) mayBeMadeAgain(folder);
     return {};
 }
 
@@ -338,24 +358,7 @@ Result<glm::ivec2> parseSize(std::string_view text, const Limits& limits) {
 }
 
 std::string textOf(const Error& error) {
-    std::string where = error.where;
-    // `'a': 'a': line 3`, at its beginning, where callers add.
-    for (std::size_t end; (end = where.find("': ")) != std::string::npos;) {
-        const auto first = where.substr(0, end + 3);
-        if (!first.starts_with('\'') || where.compare(first.size(), first.size(), first) != 0)
-            break;
-        where.erase(0, first.size());
-    }
-    // `'a'` or `'a': 'a'` before a message that names it.
-    const auto quoted = where.substr(
-        0, where.find("': ") == std::string::npos ? where.size() : where.find("': ") + 1);
-    if (quoted.size() > 2 && quoted.starts_with('\'') && quoted.ends_with('\'') &&
-        (error.message.find(quoted) != std::string::npos ||
-         where.find(quoted, quoted.size()) != std::string::npos)) {
-        where.erase(0, quoted.size());
-        if (where.starts_with(": ")) where.erase(0, 2);
-    }
-    return where.empty() ? error.message : where + ": " + error.message;
+    return textNamingOnce(error);
 }
 
 std::string humanBytes(std::uint64_t bytes) {
@@ -398,9 +401,22 @@ std::string nearestWord(std::string_view word, const std::vector<std::string>& w
     return best;
 }
 
+namespace {
+
+/// Those of the pictures of a scene as text, which lie in a folder of their own.
+std::uint64_t bytesBeside(const std::filesystem::path& path) {
+    const auto container = mpeg4ContainerOf(path);
+    if (!container || *container == Mpeg4Container::mp4) return 0;
+    const auto real = throughLinks(path);
+    return real ? bytesOf(folderOf(*real) / mpeg4::mediaFolderName(*real)) : 0;
+}
+
+}  // namespace
+
 std::uint64_t bytesOf(const std::filesystem::path& path) {
     std::error_code ec;
-    if (std::filesystem::is_regular_file(path, ec)) return std::filesystem::file_size(path, ec);
+    if (std::filesystem::is_regular_file(path, ec))
+        return std::filesystem::file_size(path, ec) + bytesBeside(path);
     std::uint64_t sum = 0;
     if (frameName(path.string(), 0))
         if (const auto files = numberedFiles(path.string()))
@@ -459,7 +475,7 @@ Result<void> checkTarget(const std::filesystem::path& target, Program& program) 
     STX_CHECK(program.makeFolderOf(target));
     std::error_code ec;
     if (program.common.noClobber &&
-        std::filesystem::exists(std::filesystem::symlink_status(target, ec)))
+        std::filesystem::exists(std::filesystem::symlink_status(target, ec)) && !isStream(target))
         return fail(ErrorCode::io, "'{}' exists and --no-clobber forbids to replace it",
                     target.string());
     return checkIsNotNamed(target);

@@ -55,6 +55,8 @@ class Program {
     void print(std::string_view text);
     /// The same for JSON: valid UTF-8, whatever the bytes of names in it are.
     void printJson(const nlohmann::ordered_json& json);
+    /// The same in one line, of which other programs can take one after the other.
+    void printJsonLine(const nlohmann::ordered_json& json);
     /// One line for a person on stderr, unless --quiet; through printable().
     void say(std::string_view line);
     /// The same, also under --quiet: for errors.
@@ -73,8 +75,9 @@ class Program {
     /// (error-report.schema.json).
     [[nodiscard]] int run(const std::function<Result<int>()>& body);
 
-    /// Errors when the folder of `target` is not there and may not be made, or cannot be written.
-    /// Else makes it, and run() takes it away when nothing came to be in it.
+    /// Errors when the folder of `target`, or of the file that its link leads to, is not there and
+    /// may not be made, or cannot be written. Else makes it, and run() takes it away when nothing
+    /// came to be in it. Of a device, a pipe or an open descriptor nothing is looked at.
     [[nodiscard]] Result<void> makeFolderOf(const std::filesystem::path& target);
 
   private:
@@ -101,8 +104,7 @@ class Program {
 /// A direction: "X,Y,Z", or an axis: "Z", "-Y". Errors (usage) also when it has no length.
 [[nodiscard]] Result<glm::dvec3> parseDirection(std::string_view text, std::string_view option);
 
-/// Error::text() with each file named once: what knows a file's name says it, and so does its
-/// caller.
+/// textNamingOnce(), for what people read.
 [[nodiscard]] std::string textOf(const Error& error);
 /// "1.2 MB", for messages.
 [[nodiscard]] std::string humanBytes(std::uint64_t bytes);
@@ -110,7 +112,7 @@ class Program {
 [[nodiscard]] std::string humanSeconds(double seconds);
 /// The nearest of `words` to `word`, or empty when none is near.
 [[nodiscard]] std::string nearestWord(std::string_view word, const std::vector<std::string>& words);
-/// Size of a file, or of all files in a folder.
+/// Size of a file, or of all files in a folder; of a scene as text its pictures beside it included.
 [[nodiscard]] std::uint64_t bytesOf(const std::filesystem::path& path);
 /// Whether an output is there: a file or a folder, or one of the files of a numbered name.
 [[nodiscard]] bool isThere(const std::string& output);

@@ -9,6 +9,8 @@
 #include "formats/any/save.hpp"
 #include "formats/files/file_spool.hpp"
 #include "formats/files/files.hpp"
+#include "formats/files/stream_names.hpp"
+#include "formats/files/temporaries.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "tools/peak_of_views.hpp"
 
@@ -188,7 +190,7 @@ Result<std::unique_ptr<ViewTable>> refinedViews(std::unique_ptr<ViewTable> table
 }
 
 std::filesystem::path folderBeside(const std::string& output) {
-    return output == "-" ? std::filesystem::temp_directory_path() : folderOf(output);
+    return output == "-" || isStream(output) ? folderOfTemporaries() : folderOf(output);
 }
 
 std::unique_ptr<Sequence> changedOnTheWay(

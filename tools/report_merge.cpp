@@ -7,6 +7,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+/// U+FFFD, which the JSON of reports has where a name is not UTF-8.
+constexpr std::string_view kNoUtf8 = "\xEF\xBF\xBD";
+
 /// The whole number of a key, at least 0.
 Result<std::size_t> wholeOf(const Json& json, const char* key) {
     const auto found = json.find(key);
@@ -74,7 +77,10 @@ Result<void> MergedReport::addEntry(Json entry, std::size_t total) {
                             index, entry.value(key, ""), before.value(key, ""));
         if (known->second.status > status) return {};
     }
-    entries_[index] = {status, entry.dump(-1, ' ', false, Json::error_handler_t::replace)};
+    // A file that breaks rules was validated, which is all that its status says.
+    const bool breaksRules = status == Status::ok && entry.value("exitCode", 0) != 0;
+    entries_[index] = {status, breaksRules,
+                       entry.dump(-1, ' ', false, Json::error_handler_t::replace)};
     return {};
 }
 
@@ -172,10 +178,12 @@ Result<void> MergedReport::add(std::string_view text) {
 
 MergedReport::Counts MergedReport::counts() const {
     Counts counts;
-    for (const auto& [index, entry] : entries_)
+    for (const auto& [index, entry] : entries_) {
         ++(entry.status == Status::ok        ? counts.ok
            : entry.status == Status::skipped ? counts.skipped
                                              : counts.failed);
+        if (entry.breaksRules) ++counts.breakRules;
+    }
     return counts;
 }
 
@@ -215,12 +223,19 @@ Result<void> MergedReport::checkInputs(const std::vector<std::string>& names) co
     return {};
 }
 
-std::vector<std::string> MergedReport::outputs() const {
+Result<std::vector<std::string>> MergedReport::outputs() const {
     std::vector<std::string> out;
     for (const auto& [index, entry] : entries_) {
         if (entry.status == Status::error) continue;
         // What was validated has none.
         auto output = Json::parse(entry.line, nullptr, false).value("output", "");
+        // Several names may have become this one.
+        if (output.find(kNoUtf8) != std::string::npos)
+            return fail(ErrorCode::invalidInput,
+                        "--outputs: the name of output {}, '{}', is not UTF-8, and reports have "
+                        "U+FFFD in place of some of its bytes; leave --outputs out, or give the "
+                        "output another name",
+                        index, output);
         if (!output.empty()) out.push_back(std::move(output));
     }
     return out;

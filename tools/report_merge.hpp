@@ -30,6 +30,7 @@ class MergedReport {
 
     struct Counts {
         std::size_t ok = 0, skipped = 0, failed = 0;
+        std::size_t breakRules = 0;  ///< of those that are ok: validated, and not without findings
     };
     [[nodiscard]] Counts counts() const;
     /// Neighbouring indices that no report has, first and last of them included.
@@ -45,8 +46,9 @@ class MergedReport {
     /// not the inputs of the reports (reports of pictures name none).
     [[nodiscard]] Result<void> checkInputs(const std::vector<std::string>& names) const;
 
-    /// The outputs that are reported as done or skipped, by index.
-    [[nodiscard]] std::vector<std::string> outputs() const;
+    /// The outputs that are reported as done or skipped, by index. Error (invalidInput): a name
+    /// that reports do not hold as it is, since it is no UTF-8.
+    [[nodiscard]] Result<std::vector<std::string>> outputs() const;
 
     /// The joined report: JSON lines, or one report of all pictures; each entry once, by index.
     [[nodiscard]] std::string text() const;
@@ -56,6 +58,7 @@ class MergedReport {
     enum class Status : std::uint8_t { error, skipped, ok };
     struct Entry {
         Status status;
+        bool breaksRules;  ///< it is ok, and its exit code is another than 0
         std::string line;  ///< JSON; shorter than the parsed form, of which there may be millions
     };
     [[nodiscard]] Result<void> addEntry(nlohmann::ordered_json entry, std::size_t total);

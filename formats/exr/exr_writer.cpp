@@ -283,10 +283,11 @@ ExrWriter::~ExrWriter() = default;
 
 Result<ExrWriter> ExrWriter::create(OutputFile& file, const std::vector<ExrPart>& parts) {
     auto impl = std::make_unique<Impl>();
-    impl->where = fmt::format("cannot write '{}'", shownName(file.temporaryPath()).string());
+    STX_TRY(const std::filesystem::path path, file.temporaryPath());
+    impl->where = fmt::format("cannot write '{}'", shownName(path).string());
     impl->parts = parts;
     STX_CHECK(adapt(ErrorCode::io, impl->where, [&]() -> Result<void> {
-        impl->stream = std::make_unique<exr::OutputStream>(file.temporaryPath());
+        impl->stream = std::make_unique<exr::OutputStream>(path);
         impl->writeHeaders();
         impl->tables = impl->stream->tellp();
         for (const ExrPart& part : impl->parts)

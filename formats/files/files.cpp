@@ -14,8 +14,10 @@
 #include <set>
 #include <system_error>
 
+#include "formats/files/folder_mode.hpp"
 #include "formats/files/named_files.hpp"
 #include "formats/files/shown_name.hpp"
+#include "formats/files/stream_names.hpp"
 #include "formats/files/temporaries.hpp"
 
 namespace stx {
@@ -177,7 +179,7 @@ struct OutputFile::Impl {
     Descriptor fd;
     fs::path temporary;   ///< empty when bytes go straight to `fd`
     Descriptor lock;      ///< of a direct one's temporary, as `fd` is of others: it is in use
-    bool direct = false;  ///< stdout or a device
+    bool direct = false;  ///< an open descriptor, as stdout, or a device
     bool committed = false;
     /// Whole: only its name is missing, until the others of OutputFiles are whole, too.
     bool waits = false;
@@ -230,10 +232,13 @@ Result<OutputFile> OutputFile::create(const fs::path& target, Options options) {
     auto impl = std::make_unique<Impl>();
     impl->target = target;
     impl->options = options;
-    if (target == "-") {
+    const bool standard = target == "-";
+    // What the caller opened is written on, where it is: opened by its name, a log would begin
+    // again, and renamed to it, a file would take the log's place.
+    if (const auto open = standard ? std::optional(STDOUT_FILENO) : descriptorNamed(target)) {
         impl->direct = true;
-        impl->target = "standard output";
-        impl->fd = Descriptor(::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3));
+        if (standard) impl->target = "standard output";
+        impl->fd = Descriptor(::fcntl(*open, F_DUPFD_CLOEXEC, 3));
         if (impl->fd.get() < 0) return failIo("write", impl->target, errno);
         return OutputFile(std::move(impl));
     }
@@ -278,20 +283,20 @@ Result<void> OutputFile::write(std::string_view text) {
     return write(std::as_bytes(std::span(text.data(), text.size())));
 }
 
-const fs::path& OutputFile::temporaryPath() const {
+Result<fs::path> OutputFile::temporaryPath() const {
     if (impl_->temporary.empty()) {
         // Bytes for stdout or a device that a library writes by name: gathered in a file, and
         // copied by commit().
-        std::error_code ec;
-        fs::path folder = fs::temp_directory_path(ec);
-        if (ec) folder = "/tmp";
+        const fs::path folder = folderOfTemporaries();
         removeStaleTemporaries(folder);
-        if (auto file = createTemporaryFile(folder)) {
-            impl_->temporary = std::move(file->path);
-            impl_->lock = std::move(file->fd);
-        } else {
-            impl_->temporary = folder / "stx-no-temporary-file";
-        }
+        auto file = createTemporaryFile(folder);
+        if (!file)
+            return fail(ErrorCode::io,
+                        "cannot write '{}': no temporary file can be made in '{}': {}; set TMPDIR "
+                        "to a folder that can be written",
+                        impl_->target.string(), folder.string(), systemText(file.error()));
+        impl_->temporary = std::move(file->path);
+        impl_->lock = std::move(file->fd);
     }
     return impl_->temporary;
 }
@@ -357,6 +362,7 @@ struct OutputFolder::Impl {
     fs::path temporary;
     fs::path named;   ///< as it was given to rememberTarget(); commit() may move `temporary`
     Descriptor lock;  ///< tells other runs that the temporary folder is in use
+    std::optional<FolderMode> mode;  ///< of the folder that is replaced
     bool committed = false;
     bool waits = false;  ///< as that of OutputFile
 
@@ -405,6 +411,9 @@ Result<OutputFolder> OutputFolder::create(const fs::path& target, OutputFile::Op
     impl->lock = std::move(temporary->fd);
     impl->temporary = std::move(temporary->path);
     impl->named = impl->temporary;
+    // From now on: what is written into it is for the same readers.
+    impl->mode = modeOfFolder(impl->real);
+    if (impl->mode) takeMode(*impl->mode, impl->temporary);
     rememberTarget(impl->named, named);
     return OutputFolder(std::move(impl));
 }
@@ -512,6 +521,9 @@ Result<void> OutputFolder::commit() {
             }
             f.temporary = aside;
         }
+        if (f.mode) takeWholeMode(*f.mode, f.real);
+        // Nor does the old one keep its files where nobody might write into it.
+        ::chmod(f.temporary.c_str(), S_IRWXU);
         std::error_code ec;
         fs::remove_all(f.temporary, ec);
         error = 0;

@@ -24,7 +24,8 @@ using ByteSpan = std::span<const std::byte>;
 class OutputFiles;
 
 /// A file that is written whole or not at all: bytes go to a temporary name beside the target,
-/// commit() flushes and renames. Destroyed without commit(): nothing stays. "-" is stdout.
+/// commit() flushes and renames. Destroyed without commit(): nothing stays. "-" is stdout; of that,
+/// of /dev/stdout and the like (descriptorNamed()), and of devices what is there goes on.
 class OutputFile {
   public:
     struct Options {
@@ -42,8 +43,9 @@ class OutputFile {
 
     [[nodiscard]] Result<void> write(ByteSpan bytes);
     [[nodiscard]] Result<void> write(std::string_view text);
-    /// Where the bytes are until commit(), for libraries that write by name.
-    [[nodiscard]] const std::filesystem::path& temporaryPath() const;
+    /// Where the bytes are until commit(), for libraries that write by name. Error (io): those of a
+    /// stream are gathered in folderOfTemporaries(), and no file can be made there.
+    [[nodiscard]] Result<std::filesystem::path> temporaryPath() const;
     [[nodiscard]] Result<void> commit();
 
   private:

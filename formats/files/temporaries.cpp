@@ -9,6 +9,7 @@
 #include <random>
 #include <set>
 #include <string>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -41,10 +42,10 @@ bool lockAndKeep(int fd, const fs::path& path) {
 
 constexpr int kAttempts = 1000;
 
-/// Folders where this process has made temporaries.
+/// Folders where this process has made temporaries, and those that it may make again.
 struct Folders {
     std::mutex mutex;
-    std::set<fs::path> paths;
+    std::set<fs::path> paths, again;
 };
 Folders& foldersUsed() {
     static auto* const folders = new Folders;  // outlives every thread
@@ -56,7 +57,31 @@ void remember(const fs::path& folder) {
     foldersUsed().paths.insert(folder);
 }
 
+/// Whether to try again after that error: the folder was gone, may be made again, and is there, or
+/// was taken away once more.
+bool isThereAgain(const fs::path& folder, int error) {
+    if (error != ENOENT) return false;
+    {
+        const std::lock_guard lock(foldersUsed().mutex);
+        if (!foldersUsed().again.contains(folder.lexically_normal())) return false;
+    }
+    std::error_code ec;
+    fs::create_directories(folder, ec);
+    return !ec || ec == std::errc::no_such_file_or_directory;
+}
+
 }  // namespace
+
+fs::path folderOfTemporaries() {
+    std::error_code ec;
+    fs::path folder = fs::temp_directory_path(ec);
+    return ec ? fs::path("/tmp") : folder;
+}
+
+void mayBeMadeAgain(const fs::path& folder) {
+    const std::lock_guard lock(foldersUsed().mutex);
+    foldersUsed().again.insert(folder.lexically_normal());
+}
 
 tl::expected<Temporary, int> createTemporaryFile(const fs::path& folder) {
     remember(folder);
@@ -64,8 +89,9 @@ tl::expected<Temporary, int> createTemporaryFile(const fs::path& folder) {
         const fs::path path = nextName(folder);
         Descriptor fd(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
         if (fd.get() < 0) {
-            if (errno == EEXIST) continue;
-            return tl::unexpected(errno);
+            const int error = errno;
+            if (error == EEXIST || isThereAgain(folder, error)) continue;
+            return tl::unexpected(error);
         }
         if (lockAndKeep(fd.get(), path)) return Temporary{path, std::move(fd)};
     }
@@ -77,8 +103,9 @@ tl::expected<Temporary, int> createTemporaryFolder(const fs::path& folder) {
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
         const fs::path path = nextName(folder);
         if (::mkdir(path.c_str(), 0777) != 0) {
-            if (errno == EEXIST) continue;
-            return tl::unexpected(errno);
+            const int error = errno;
+            if (error == EEXIST || isThereAgain(folder, error)) continue;
+            return tl::unexpected(error);
         }
         Descriptor fd(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
         if (fd.get() >= 0 && lockAndKeep(fd.get(), path)) return Temporary{path, std::move(fd)};

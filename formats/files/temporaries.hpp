@@ -46,6 +46,14 @@ struct Temporary {
     Descriptor fd;  ///< open for writing (a folder: for reading), locked
 };
 
+/// Where to gather what has no folder of its own: what TMPDIR names, if that is a folder, else
+/// /tmp.
+[[nodiscard]] std::filesystem::path folderOfTemporaries();
+
+/// Lets temporaries make `folder` again when it is gone by then: runs that end take away the
+/// folders that they made and left empty, also where other runs are about to write into these.
+void mayBeMadeAgain(const std::filesystem::path& folder);
+
 /// A new, empty, locked file in `folder`; errno when that fails.
 [[nodiscard]] tl::expected<Temporary, int> createTemporaryFile(const std::filesystem::path& folder);
 /// The same for a folder in a folder.

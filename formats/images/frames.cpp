@@ -66,7 +66,7 @@ Result<void> writeByModule(const Rgba8Image& rgba, FrameFormat format, const Out
     STX_TRY(const auto* codecs, loadCodecs());
     std::vector<std::uint8_t> rgb;
     codecs::EncodeRequest request;
-    const std::string path = file.temporaryPath().string();
+    STX_TRY(const std::string path, file.temporaryPath());
     request.path = path.c_str();
     request.format = format == FrameFormat::tiff ? "tiff" : "webp";
     request.width = rgba.width();

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "formats/validate/findings.hpp"
+#include "lib/base/error_text.hpp"
 #include "lib/model/view_checks.hpp"
 #include "lib/surface/normals.hpp"
 
@@ -17,7 +18,7 @@ void Findings::add(int rule, std::string where, std::string found, std::string e
 Result<std::vector<Finding>> unreadable(const Error& error) {
     if (error.code == ErrorCode::io) return tl::unexpected(error);
     Findings findings;
-    findings.add(1001, "", error.text(), "a file that can be read");
+    findings.add(1001, "", textNamingOnce(error), "a file that can be read");
     return findings.list;
 }
 

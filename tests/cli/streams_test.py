@@ -11,14 +11,21 @@ import time
 import harness
 
 
-def run(command, cwd, closed=(), stderr=None, stdout=None, processes=None):
+def become_nobody():
+    """Root may write anywhere, and is not counted."""
+    if os.geteuid() == 0:
+        os.setgid(65534)
+        os.setuid(65534)
+
+
+def run(command, cwd, closed=(), stderr=None, stdout=None, processes=None, nobody=False):
     def before():
+        if nobody:
+            become_nobody()
         for stream in closed:
             os.close(stream)
         if processes is not None:
-            if os.geteuid() == 0:  # root is not counted
-                os.setgid(65534)
-                os.setuid(65534)
+            become_nobody()
             resource.setrlimit(resource.RLIMIT_NPROC, (processes, processes))
 
     return subprocess.run(command, cwd=cwd, stdin=subprocess.DEVNULL, stdout=stdout or subprocess.PIPE,
@@ -53,6 +60,18 @@ def main():
             expect(f"{words} without stdout", run([args.stx] + words, folder, closed=[1]), 2)
         # What is opened first does not become stdin.
         expect("film without stdin", run([args.stx, "background", video, "-o", "c.png"], folder, closed=[0]), 0)
+
+        # Who may write nothing beside a device, or beside a link, writes to what they are.
+        expect("report to a device", run(convert + ["nobody.mp4", "--report", "/dev/null"], folder, nobody=True), 0)
+        shut = os.path.join(folder, "shut")
+        os.mkdir(shut)
+        os.symlink("../behind.mp4", os.path.join(shut, "link.mp4"))
+        os.chmod(shut, 0o555)
+        expect("through a link", run(convert + ["shut/link.mp4"], folder, nobody=True), 0)
+        expect("beside a link", run(convert + ["shut/other.mp4"], folder, nobody=True), 2)
+        if not os.path.exists(os.path.join(folder, "behind.mp4")):
+            wrong.append("through a link: nothing is there")
+        os.chmod(shut, 0o755)
 
         harness.write(os.path.join(folder, "list"), "quad.obj\nnone.obj\n")
         batch = [args.stx, "convert", "@list", "-o", "batch_{stem}.mp4", "--views", "ring:2", "--size", "24x24",

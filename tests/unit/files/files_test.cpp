@@ -81,8 +81,8 @@ TEST(OutputFile, AppearsAtCommitOnly) {
     ASSERT_TRUE(file->write("new "));
     ASSERT_TRUE(file->write(bytesOf("bytes")));
     EXPECT_EQ(get(folder / "a"), "old");
-    EXPECT_EQ(file->temporaryPath().parent_path(), folder.path());
-    EXPECT_TRUE(file->temporaryPath().filename().string().starts_with(".stx-tmp-"));
+    EXPECT_EQ(file->temporaryPath()->parent_path(), folder.path());
+    EXPECT_TRUE(file->temporaryPath()->filename().string().starts_with(".stx-tmp-"));
     ASSERT_TRUE(file->commit());
     EXPECT_EQ(get(folder / "a"), "new bytes");
     EXPECT_EQ(namesIn(folder.path()), (std::set<std::string>{"a"}));
@@ -290,7 +290,7 @@ TEST(OutputFile, KilledRunsAreCleanedUpAndLivingOnesAreNot) {
               }),
               0);
     EXPECT_EQ(namesIn(folder.path()),
-              (std::set<std::string>{living->temporaryPath().filename().string()}));
+              (std::set<std::string>{living->temporaryPath()->filename().string()}));
     ASSERT_TRUE(living->write("b"));
     ASSERT_TRUE(living->commit());
     EXPECT_EQ(namesIn(folder.path()), (std::set<std::string>{"b"}));
@@ -319,12 +319,12 @@ TEST(OutputFile, TemporaryPathTakesWritesByName) {
     const TemporaryFolder folder;
     auto file = OutputFile::create(folder / "a");
     ASSERT_TRUE(file);
-    put(file->temporaryPath(), "by name");
+    put(*file->temporaryPath(), "by name");
     ASSERT_TRUE(file->commit());
     EXPECT_EQ(get(folder / "a"), "by name");
     auto null = OutputFile::create("/dev/null");
     ASSERT_TRUE(null);
-    const fs::path gathered = null->temporaryPath();
+    const fs::path gathered = *null->temporaryPath();
     put(gathered, "by name");
     ASSERT_TRUE(null->commit());
     EXPECT_FALSE(fs::exists(gathered));
@@ -336,7 +336,7 @@ TEST(OutputFile, WhatIsGatheredForADeviceIsNotTakenForStale) {
         ::setenv("TMPDIR", folder.path().c_str(), 1);
         auto null = OutputFile::create("/dev/null");
         if (!null) return 1;
-        const fs::path gathered = null->temporaryPath();
+        const fs::path gathered = *null->temporaryPath();
         put(gathered, "by name");
         if (gathered.parent_path() != folder.path()) return 2;
         // As another run does.

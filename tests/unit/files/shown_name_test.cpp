@@ -14,14 +14,14 @@ TEST(ShownName, TemporaryPathsAreShownAsTheirTargets) {
     {
         auto file = OutputFile::create(folder / "a.txt");
         ASSERT_TRUE(file);
-        left = file->temporaryPath();
+        left = *file->temporaryPath();
         EXPECT_EQ(shownName(left), folder / "a.txt");
         auto set = OutputFolder::create(folder / "set", {});
         ASSERT_TRUE(set);
         EXPECT_EQ(shownName(set->temporaryPath() / "images/b.png"), folder / "set/images/b.png");
         auto inside = OutputFile::create(set->temporaryPath() / "c.png");
         ASSERT_TRUE(inside);
-        EXPECT_EQ(shownName(inside->temporaryPath()), folder / "set/c.png");
+        EXPECT_EQ(shownName(*inside->temporaryPath()), folder / "set/c.png");
     }
     EXPECT_EQ(shownName(left), left);
     EXPECT_EQ(shownName("other.png"), "other.png");
