@@ -42,6 +42,7 @@ class PictureFiles final : public PictureSource {
     [[nodiscard]] double focalHint(int k) const override {
         return notes_[k].focal35 / kHalfDiagonal35;
     }
+    [[nodiscard]] bool oriented(int k) const override { return notes_[k].oriented; }
     [[nodiscard]] Result<Rgba8Image> picture(int k) override {
         const auto at = static_cast<std::size_t>(k);
         {
