@@ -200,9 +200,9 @@ namespace {
 
 /// What it costs that a picture is on its side (unlikelihood()): of one whose camera wrote down how
 /// it was held, and of others. The former are so only where the camera has no sense of it and
-/// always writes the same. It is more than what a turn up and down costs, from -20 to 80
-/// degrees 3.3 a picture, and less than what a full turn of portraits costs when it is taken for
-/// one over the zenith, 4.1.
+/// always writes the same. It is more than what a turn up and down costs, from -20 to 80 degrees
+/// 3.3 a picture, and less than what a full turn of portraits costs when it is taken for one over
+/// the zenith, 4.1 and more.
 constexpr double kOrientedSideways = 3.5, kSideways = 1;
 /// Pictures that nobody says the orientation of are upright where that costs no more than this for
 /// each: in folders and viewers they are.
