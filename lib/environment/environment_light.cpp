@@ -37,7 +37,7 @@ constexpr int kTile = 8;
 using Pieces = std::vector<EnvironmentPiece>;
 
 /// Pieces of faces of `side`, `by` along each side joined to one.
-Pieces joined(const Pieces& pieces, int side, int by) {
+Pieces joinedPieces(const Pieces& pieces, int side, int by) {
     const int less = side / by;
     Pieces out(pieces.size() / (static_cast<std::size_t>(by) * by));
     for (int row = 0; row < 6 * side; ++row) {
@@ -214,7 +214,7 @@ Result<std::shared_ptr<const EnvironmentLight>> EnvironmentLight::make(
         // Where a lobe has fallen to a half, on both sides.
         light->lobeRad_ = 2.0f * std::acos(std::pow(0.5f, 1.0f / shininess));
     } else if (shininess > 0) {
-        STX_TRY(light->gloss_, EnvironmentMap::make(lobesOf(joined(pieces, side, kJoined),
+        STX_TRY(light->gloss_, EnvironmentMap::make(lobesOf(joinedPieces(pieces, side, kJoined),
                                                             side / kJoined, shininess, kCoarse),
                                                     limits));
         light->glossTable_ = tableOf(*light->gloss_);

@@ -245,15 +245,15 @@ glm::dvec3 acrossAll(const std::vector<glm::dmat3>& frames, int axis) {
 }
 
 /// unlikelihood() of all frames. `sideways`: of each.
-double costOf(const std::vector<glm::dmat3>& frames, const std::vector<double>& sideways,
-              glm::dvec3 up) {
+double unlikelihoodOfAll(const std::vector<glm::dmat3>& frames, const std::vector<double>& sideways,
+                         glm::dvec3 up) {
     double cost = 0;
     for (std::size_t k = 0; k < frames.size(); ++k)
         cost += unlikelihood(frames[k], up, sideways[k]);
     return cost;
 }
 
-/// The direction of the least costOf(), and that cost.
+/// The direction of the least unlikelihoodOfAll(), and that cost.
 struct LeastCost {
     glm::dvec3 up{0, 1, 0};
     double cost = std::numeric_limits<double>::max();
@@ -277,14 +277,14 @@ LeastCost leastCost(const std::vector<glm::dmat3>& frames, const std::vector<dou
     // Always downhill, in steps that shrink.
     for (const glm::dvec3 start : starts) {
         glm::dvec3 up = start;
-        double cost = costOf(frames, sideways, up);
+        double cost = unlikelihoodOfAll(frames, sideways, up);
         for (double step = kFirstUpStep; step > kLastUpStep;) {
             const glm::dvec3 across = anyAcross(up);
             const glm::dvec3 along = glm::cross(up, across);
             bool better = false;
             for (const glm::dvec3 d : {across, -across, along, -along}) {
                 const glm::dvec3 next = glm::normalize(up + step * d);
-                const double now = costOf(frames, sideways, next);
+                const double now = unlikelihoodOfAll(frames, sideways, next);
                 if (!(now < cost)) continue;
                 cost = now;
                 up = next;
@@ -314,7 +314,8 @@ UpOfTurn findUp(const TurnModel& model, const std::vector<bool>& oriented) {
     const LeastCost any = leastCost(frames, sideways);
     const std::vector<double> never(frames.size(), std::numeric_limits<double>::infinity());
     // All say how they were held, or none is on its side.
-    if (notOriented == 0 || costOf(frames, never, any.up) <= any.cost) return {any.up, false};
+    if (notOriented == 0 || unlikelihoodOfAll(frames, never, any.up) <= any.cost)
+        return {any.up, false};
     const LeastCost upright = leastCost(frames, never);
     const bool byOwnTops = glm::dot(any.up, upright.up) < kOtherUp &&
                            upright.cost - any.cost <= kOwnTops * notOriented;
