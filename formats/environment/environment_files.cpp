@@ -12,6 +12,7 @@
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/photos/file_colours.hpp"
+#include "formats/photos/photo.hpp"
 #include "lib/environment/environment_map.hpp"
 
 namespace stx {
@@ -29,6 +30,12 @@ std::string lower(std::string text) {
 
 Result<Texture> readPicture(const fs::path& path, Job& job) {
     STX_TRY(const auto bytes, readFile(path, job.limits));
+    if (photos::isHeif(bytes)) {
+        std::string colours;
+        STX_TRY(auto shown, photos::decodeAsShown(bytes, path.string(), job.limits, colours));
+        if (!colours.empty()) job.note(colours);
+        return Texture(std::move(shown));
+    }
     STX_TRY(auto decoded, decodeImage(bytes, path.string(), job.limits));
     if (auto* light = std::get_if<std::vector<float>>(&decoded.values); light && decoded.linear)
         makeFinite(*light, decoded.channelNames, fmt::format("'{}'", path.string()), job);
@@ -185,7 +192,9 @@ Result<std::shared_ptr<const Environment>> openEnvironment(const fs::path& path,
     Bytes head(static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), 4096)));
     STX_CHECK(within(where, source.read(0, head)));
     if (isExrFile(head)) return readEnvironmentExr(path, job);
-    if (mpeg4ContainerOf(ByteSpan(head)) || mpeg4ContainerOf(path)) return openScene(path, job);
+    // HEIC begins as an MP4 does.
+    const bool scene = mpeg4ContainerOf(ByteSpan(head)) || mpeg4ContainerOf(path);
+    if (scene && !photos::isHeif(head)) return openScene(path, job);
     STX_TRY(Texture picture, readPicture(path, job));
     if (picture.width() != 2 * picture.height())
         return failAt(where, ErrorCode::invalidInput,

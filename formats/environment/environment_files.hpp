@@ -9,8 +9,8 @@
 namespace stx {
 
 /// Opens an environment:
-///  - an equirectangular picture (.png, .jpg and what else decodeImage() reads), twice as wide as
-///    high, -Z in the middle, +Y up;
+///  - an equirectangular picture (.png, .jpg, HEIC and what else decodeImage() reads), twice as
+///    wide as high, -Z in the middle, +Y up;
 ///  - an OpenEXR file: a part with the attribute `envmap`, latlong or cube, else a picture twice as
 ///    wide as high (environment_exr.hpp);
 ///  - a folder of six faces named front, back, left, right, top and bottom (any prefix that ends

@@ -18,6 +18,7 @@
 #include "formats/imagesets/set_options.hpp"
 #include "formats/imagesets/two_cameras.hpp"
 #include "formats/photos/photo.hpp"
+#include "lib/environment/environment_map.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -282,18 +283,36 @@ class KeptDepth {
     std::optional<StoredDepth> depth_;
 };
 
-Result<StoredView> loadPhoto(const Photo& photo, const PhotoDepth& depth, KeptDepth& kept,
-                             bool wantsMatte, const std::vector<std::string>& notes, Job& job) {
+/// The picture of a photo, upright. `deep`: see ImageSetOptions::deepColour.
+Result<StoredColour> colourOf(const Photo& photo, const std::string& name, bool deep, Job& job) {
+    if (photo.colour.coding == PhotoImage::Coding::heif) {
+        std::string profile;
+        STX_TRY(auto picture, photos::decodeColour(photo, profile, job));
+        if (!profile.empty()) job.note(profile);
+        return StoredColour{std::move(picture)};
+    }
+    STX_TRY(auto stored, colourOfFile(photo.colour.bytes, name, deep, job));
+    if (auto* coded = stored.texture.rgba8())
+        stored.texture = turnedUpright(std::move(*coded), photo.orientation);
+    else
+        stored.texture = turnedUpright(std::move(*stored.texture.rgbaFloat()), photo.orientation);
+    // Most programs write alpha without cutting anything out.
+    stored.alpha = stored.alpha && !isOpaque(stored.texture);
+    return stored;
+}
+
+Result<StoredView> loadPhoto(const Photo& photo, const std::string& name, const PhotoDepth& depth,
+                             KeptDepth& kept, bool wantsMatte, bool deep,
+                             const std::vector<std::string>& notes, Job& job) {
     for (const std::string& note : notes) job.note(note);
     StoredView stored;
     auto values = kept.take();
     if (!values) STX_SET(values, storedDepth(photo, depth, job));
     stored.depth = std::move(values->values);
     stored.largest = values->largest;
-    std::string profile;
-    STX_TRY(auto picture, photos::decodeColour(photo, profile, job));
-    if (!profile.empty()) job.note(profile);
-    stored.texture = std::move(picture);
+    STX_TRY(auto colour, colourOf(photo, name, deep, job));
+    stored.texture = std::move(colour.texture);
+    stored.alpha = colour.alpha;
     if (wantsMatte && photo.matte.coding != PhotoImage::Coding::none) {
         if (auto matte = photos::decodeMatte(photo, job))
             stored.matte = std::move(*matte);
@@ -383,6 +402,14 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
     view.texture.path = given;
     view.texture.name = given.filename().string();
     view.depth.name = view.texture.name;
+    // Depth beside it is turned, or not, by the sizes of both.
+    if (photo->colour.width == 0) {
+        Job aside;  // loading the picture gives the same notes
+        aside.limits = job.limits;
+        STX_TRY(const glm::ivec2 stored, within(where, imageSizeOf(view.texture, aside)));
+        photo->colour.width = stored.x;
+        photo->colour.height = stored.y;
+    }
     if (!beside.empty()) {
         photo->format = "picture and depth";
         STX_TRY(depth, besideDepth(beside, options, *photo, read, job));
@@ -396,12 +423,7 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
     STX_CHECK(within(where, setRange(*photo, options, depth, read, job)));
     photo->code = depth.code;
 
-    glm::ivec2 size = photo->uprightSize(photo->colour);
-    if (size.x == 0) {
-        STX_TRY(size, within(where, imageSizeOf(view.texture, job)));
-        photo->colour.width = size.x;
-        photo->colour.height = size.y;
-    }
+    const glm::ivec2 size = photo->uprightSize(photo->colour);
     SetDescription set;
     std::vector<std::string> notes;
     view.camera = cameraOfPhoto(*photo, size, options, set.cameraFrom, notes);
@@ -411,8 +433,9 @@ Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& o
     view.stretched = beside.empty();
     const bool raises = options.refine.atImport(RefineStep::raise, true);
     const auto kept = std::make_shared<KeptDepth>(std::move(read));
-    view.load = [photo, depth, kept, raises, notes](const SetView&, Job& own) {
-        return loadPhoto(*photo, depth, *kept, raises, notes, own);
+    const bool deep = options.deepColour;
+    view.load = [photo, depth, kept, raises, deep, notes](const SetView& own, Job& ownJob) {
+        return loadPhoto(*photo, own.texture.name, depth, *kept, raises, deep, notes, ownJob);
     };
     view.distances = [code = depth.code, unit = depth.unit](Image<float>& values,
                                                             const Camera& camera, int largest,

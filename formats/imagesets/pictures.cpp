@@ -16,12 +16,12 @@
 namespace stx::imagesets {
 namespace {
 
-Result<DecodedImage> decode(const PictureSource& source, ByteSpan bytes, Job& job,
+Result<DecodedImage> decode(const std::string& name, ByteSpan bytes, Job& job,
                             decltype(decodeImage)* decoder = decodeImage) {
-    noteMorePictures(bytes, source.name, job);
-    auto image = decoder(bytes, source.name, job.limits);
+    noteMorePictures(bytes, name, job);
+    auto image = decoder(bytes, name, job.limits);
     if (image && (image->width < 1 || image->height < 1))
-        return failAt(inQuotes(source.name), ErrorCode::invalidInput, "the image has no pixels");
+        return failAt(inQuotes(name), ErrorCode::invalidInput, "the image has no pixels");
     return image;
 }
 
@@ -158,17 +158,22 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         return out;
     }
     STX_TRY(const auto bytes, readFile(source.path, job.limits));
+    return colourOfFile(bytes, source.name, deep, job);
+}
+
+Result<StoredColour> colourOfFile(ByteSpan bytes, const std::string& name, bool deep, Job& job) {
+    StoredColour out;
     std::string colours;  // what is to be said of them
     if (const auto info = probeImage(bytes); info && info->bits == 8) {
         // What two components of a JPEG are, it does not say.
         out.alpha = info->format == "png" && info->channels % 2 == 0;
-        STX_TRY(auto pixels, decodeRgba8(bytes, source.name, job.limits));
+        STX_TRY(auto pixels, decodeRgba8(bytes, name, job.limits));
         photos::fileToSrgb(pixels, bytes, colours);
         if (!colours.empty()) job.note(colours);
         out.texture = std::move(pixels);
         return out;
     }
-    STX_TRY(auto image, decode(source, bytes, job));
+    STX_TRY(auto image, decode(name, bytes, job));
     out.alpha = image.channelNames.empty() ? image.channels == 2 || image.channels == 4
                                            : channelIn(image, "A") >= 0;
     if (!image.linear) {
@@ -183,7 +188,7 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         return out;
     }
     if (const std::string note = toRec709(image); !note.empty()) job.note(note);
-    STX_TRY(auto pixels, colourOfFloats(image, source.name));
+    STX_TRY(auto pixels, colourOfFloats(image, name));
     out.texture = std::move(pixels);
     return out;
 }
@@ -217,7 +222,7 @@ Result<StoredDepth> readDepth(const PictureSource& source, Job& job) {
         return out;
     }
     STX_TRY(const auto bytes, readFile(source.path, job.limits));
-    STX_TRY(const auto image, decode(source, bytes, job, decodeDepthImage));
+    STX_TRY(const auto image, decode(source.name, bytes, job, decodeDepthImage));
     STX_TRY(const int channel, depthChannel(image, source.name));
     out.values = Image<float>(image.width, image.height);
     std::visit(
@@ -253,7 +258,7 @@ Result<glm::ivec2> imageSizeOf(const PictureSource& source, Job& job) {
     }
     STX_TRY(const auto bytes, readFile(source.path, job.limits));
     if (const auto info = probeImage(bytes)) return glm::ivec2(info->width, info->height);
-    STX_TRY(const auto image, decode(source, bytes, job));
+    STX_TRY(const auto image, decode(source.name, bytes, job));
     return glm::ivec2(image.width, image.height);
 }
 

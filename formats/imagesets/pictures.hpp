@@ -14,6 +14,11 @@ struct StoredColour {
 [[nodiscard]] Result<StoredColour> readColour(const PictureSource& source, const YuvColour& colour,
                                               bool deep, Job& job);
 
+/// The same of a picture's file, as it is stored; `name` is for messages, and its ending for kinds
+/// whose first bytes do not say what they are.
+[[nodiscard]] Result<StoredColour> colourOfFile(ByteSpan bytes, const std::string& name, bool deep,
+                                                Job& job);
+
 /// The values of a depth or disparity image as they are stored.
 struct StoredDepth {
     Image<float> values;

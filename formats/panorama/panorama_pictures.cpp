@@ -8,6 +8,7 @@
 #include "formats/images/more_pictures.hpp"
 #include "formats/panorama/panorama_files.hpp"
 #include "formats/photos/file_colours.hpp"
+#include "formats/photos/photo.hpp"
 #include "formats/video/numbered_pictures.hpp"
 
 namespace stx {
@@ -17,6 +18,17 @@ namespace fs = std::filesystem;
 
 /// Half the diagonal of a picture of 36x24 mm.
 constexpr double kHalfDiagonal35 = 21.633;
+
+/// What the camera wrote into a file.
+Result<ExifNotes> notesOf(const Bytes& file, const Limits& limits) {
+    if (!photos::isHeif(file)) return readExif(file);
+    STX_TRY(const auto photo,
+            photos::openPhoto(std::make_shared<const Bytes>(file), {.needsDepth = false}, limits));
+    ExifNotes notes;
+    notes.focal35 = photo.focal35;
+    notes.oriented = true;  // its properties say how it is turned, or that it is not
+    return notes;
+}
 
 class PictureFiles final : public PictureSource {
   public:
@@ -32,7 +44,7 @@ class PictureFiles final : public PictureSource {
     Result<void> open() {
         for (std::size_t k = 0; k < files_.size(); ++k) {
             STX_TRY(const auto bytes, readFile(files_[k], job_.limits));
-            notes_[k] = readExif(bytes);
+            STX_TRY(notes_[k], within(inQuotes(files_[k].string()), notesOf(bytes, job_.limits)));
             noteMorePictures(bytes, files_[k].string(), job_);
         }
         return {};
@@ -42,6 +54,7 @@ class PictureFiles final : public PictureSource {
     [[nodiscard]] double focalHint(int k) const override {
         return notes_[k].focal35 / kHalfDiagonal35;
     }
+    [[nodiscard]] bool oriented(int k) const override { return notes_[k].oriented; }
     [[nodiscard]] Result<Rgba8Image> picture(int k) override {
         const auto at = static_cast<std::size_t>(k);
         {

@@ -8,12 +8,14 @@
 #include <memory>
 #include <optional>
 
+#include "formats/files/messages.hpp"
 #include "formats/images/exif.hpp"
 #include "formats/images/tiff_numbers.hpp"
 #include "formats/images/webp_chunks.hpp"
 #include "formats/photos/colour_profile.hpp"
 #include "formats/photos/jpeg_segments.hpp"
 #include "formats/photos/numbers.hpp"
+#include "formats/photos/photo.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx::photos {
@@ -194,6 +196,15 @@ Bytes profileOfTiff(ByteSpan file) {
     return {body.begin(), body.end()};
 }
 
+/// The picture of a HEIF file, upright.
+Result<Rgba8Image> heifAsShown(ByteSpan file, const Limits& limits, std::string& note) {
+    STX_TRY(const auto photo, openPhoto(std::make_shared<const Bytes>(file.begin(), file.end()),
+                                        {.needsDepth = false}, limits));
+    Job job;
+    job.limits = limits;
+    return decodeColour(photo, note, job);
+}
+
 }  // namespace
 
 FileColours coloursOfCodes(unsigned primaries, unsigned transfer) {
@@ -252,6 +263,7 @@ Rgba8Image srgb8From(const DecodedImage& image, ByteSpan file, std::string& note
 
 Result<Rgba8Image> decodeAsShown(ByteSpan file, std::string_view name, const Limits& limits,
                                  std::string& note, Rgba8Loss* loss) {
+    if (isHeif(file)) return within(inQuotes(name), heifAsShown(file, limits, note));
     Rgba8Image stored;
     if (const auto info = probeImage(file); info && info->bits == 8) {
         STX_SET(stored, decodeRgba8(file, name, limits, loss));

@@ -28,8 +28,10 @@ void fileToSrgb(Rgba8Image& picture, ByteSpan file, std::string& note);
 /// light stays as it is.
 [[nodiscard]] Rgba8Image srgb8From(const DecodedImage& image, ByteSpan file, std::string& note,
                                    Rgba8Loss* loss = nullptr);
-/// The picture of a file as viewers show it: 8-bit sRGB, turned as its EXIF says. `name` is for
-/// messages; `note` is as of fileToSrgb(); what is lost is added to `loss`, where that is given.
+/// The picture of a file, HEIC too, as viewers show it: 8-bit sRGB, turned as its EXIF says (HEIC:
+/// its own properties). `name` is for messages; `note` is as of fileToSrgb(); what is lost is added
+/// to `loss`, where that is given. Errors: those of decodeImage(), of HEIC of openPhoto() and
+/// decodeColour().
 [[nodiscard]] Result<Rgba8Image> decodeAsShown(ByteSpan file, std::string_view name,
                                                const Limits& limits, std::string& note,
                                                Rgba8Loss* loss = nullptr);

@@ -106,7 +106,8 @@ struct PhotoOptions {
                                       const PhotoOptions& options, const Limits& limits);
 
 /// The colour picture, upright, 8-bit sRGB; `profileNote` tells what became of its colour profile.
-/// Errors as decodeImage(); (unsupported) a HEIF picture without libheif.
+/// Of files whose first bytes say what they are; what more than 8 bits lose is not said. Errors as
+/// decodeImage(); (unsupported) a HEIF picture without libheif.
 [[nodiscard]] Result<Rgba8Image> decodeColour(const Photo& photo, std::string& profileNote,
                                               Job& job);
 

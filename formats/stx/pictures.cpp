@@ -35,16 +35,6 @@ Result<std::unique_ptr<Renderer>> borrow(const Model& model, const RenderSetting
     return renderer;
 }
 
-/// The picture of a HEIF file, upright.
-Result<Rgba8Image> heifPicture(Bytes bytes, Job& job) {
-    STX_TRY(const auto photo, photos::openPhoto(std::make_shared<const Bytes>(std::move(bytes)),
-                                                {.needsDepth = false}, job.limits));
-    std::string profile;
-    STX_TRY(auto picture, photos::decodeColour(photo, profile, job));
-    if (!profile.empty()) job.note(profile);
-    return picture;
-}
-
 constexpr double kWhite16 = 65535;
 
 /// sRGB codes of 16 bits, as floats of 0..1.
@@ -119,11 +109,12 @@ Result<Frame> render(const Model& model, const Camera& camera, const RenderSetti
 }
 
 Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
-    STX_TRY(auto bytes, readFile(path, job.limits));
+    STX_TRY(const auto bytes, readFile(path, job.limits));
     Picture picture;
     std::string colours;  // what is to be said of them
     if (photos::isHeif(bytes)) {
-        STX_TRY(picture.coded, within(inQuotes(path.string()), heifPicture(std::move(bytes), job)));
+        STX_TRY(picture.coded, photos::decodeAsShown(bytes, path.string(), job.limits, colours));
+        if (!colours.empty()) job.note(colours);
         return picture;
     }
     noteMorePictures(bytes, path.string(), job);

@@ -8,6 +8,8 @@
 #include <bit>
 #include <fstream>
 
+#include "formats/photos/photo.hpp"
+
 namespace stx {
 namespace {
 
@@ -159,6 +161,8 @@ Result<void> tellDamage(const std::string& where, const std::string& damage, boo
 }  // namespace
 
 std::string_view filmFormatOf(ByteSpan head) {
+    // Its boxes are those of a film.
+    if (photos::isHeif(head)) return {};
     const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
     const auto has = [&](std::size_t at, std::string_view part) {
         return text.size() >= at + part.size() && text.substr(at, part.size()) == part;

@@ -15,7 +15,7 @@
 namespace stx {
 
 /// What libavformat calls the container that first bytes (16 will do) begin: "matroska", "mov" or
-/// "avi"; empty for others.
+/// "avi"; empty for others, of which a HEIC picture is one.
 [[nodiscard]] std::string_view filmFormatOf(ByteSpan head);
 /// The same of a file; empty for what is not a regular file, too.
 [[nodiscard]] std::string_view filmFormatOf(const std::filesystem::path& path);

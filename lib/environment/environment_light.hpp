@@ -24,8 +24,8 @@ class EnvironmentLight {
     [[nodiscard]] glm::vec3 diffuse(glm::vec3 normal) const;
     /// The coefficients of diffuse(), as shaders/shared/environment_light.glsl has them.
     [[nodiscard]] const std::array<glm::vec3, 9>& harmonics() const { return harmonics_; }
-    /// The mean of the light around a unit direction, weighed by cos^shininess. Zero where no gloss
-    /// was prepared.
+    /// The mean of the light around a unit direction, weighed by cos^shininess (above a shininess
+    /// of 3600, by an even footprint as wide). Zero where no gloss was prepared.
     [[nodiscard]] glm::vec3 glossy(glm::vec3 direction) const;
 
     /// glossy() as a table for shaders: the six faces, each kGlossSide texels a side and one more
@@ -37,7 +37,7 @@ class EnvironmentLight {
 
   private:
     std::array<glm::vec3, 9> harmonics_{};
-    /// Weighed already, or the environment itself for lobes that are narrow.
+    /// Weighed already, or the environment itself for lobes that are very narrow.
     std::shared_ptr<const EnvironmentMap> gloss_;
     float lobeRad_ = 0;  ///< footprint of the latter
     std::vector<glm::vec3> glossTable_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include <glm/gtc/constants.hpp>
 
@@ -16,6 +17,11 @@ namespace {
 constexpr int kBorder = 2;
 /// Pictures are halved down to about this many texels a side.
 constexpr int kSmallest = 4;
+/// EnvironmentMap::pieces(): samples along a side of a piece, at least. With two, a sample that
+/// falls beside a piece instead of into it moves light by half a piece and loses none.
+constexpr int kSamplesOfPiece = 2;
+/// Samples of which the light is held at a time, 20 bytes each.
+constexpr int kSamplesAtOnce = 1 << 19;
 
 /// arctan of 0..1, within 2e-8 (Abramowitz & Stegun, 4.4.49).
 float arctan(float x) {
@@ -332,6 +338,15 @@ struct EnvironmentMap::Pictures {
         return isLinear ? filtered(linear, place, texels) : filtered(coded, place, texels);
     }
 
+    /// Columns and rows of a face, or of the picture all around; 0 where there is none.
+    [[nodiscard]] glm::ivec2 sizeOf(std::size_t face) const {
+        const auto of = [&](const auto& faces) {
+            const auto& levels = faces[face];
+            return levels.empty() ? glm::ivec2(0) : glm::ivec2(levels[0].width, levels[0].height);
+        };
+        return isLinear ? of(linear.faces) : of(coded.faces);
+    }
+
     [[nodiscard]] glm::vec4 sharpAt(glm::vec3 d) const {
         float major = 1;
         const Place place = cube ? cubePlace(d, major) : latlongPlace(d);
@@ -435,6 +450,91 @@ glm::vec4 EnvironmentMap::sampleTurned(glm::vec3 d, float spacing, bool linear) 
 
 glm::vec4 EnvironmentMap::sample(glm::vec3 direction, float footprintRad, bool linear) const {
     return sampleTurned(environmentFromWorld_ * glm::normalize(direction), footprintRad, linear);
+}
+
+std::vector<EnvironmentPiece> EnvironmentMap::pieces(int side) const {
+    struct Sample {
+        std::uint32_t piece;
+        float solidAngle;
+        glm::vec3 light;  ///< times the solid angle
+    };
+    const auto count = static_cast<std::size_t>(6) * side * side;
+    std::vector<glm::dvec4> sums(count, glm::dvec4(0));
+    const glm::mat3 worldFromEnvironment = glm::transpose(environmentFromWorld_);
+    const auto pieceOf = [&](glm::vec3 d) {
+        float major = 1;
+        const Place at = cubePlace(worldFromEnvironment * d, major);
+        const auto cell = [&](float x) {
+            return std::clamp(static_cast<int>(x * static_cast<float>(side)), 0, side - 1);
+        };
+        return static_cast<std::uint32_t>((static_cast<int>(at.face) * side + cell(at.v)) * side +
+                                          cell(at.u));
+    };
+    // directionOf(x, y, solidAngle) gives a direction in the environment's own axes. Samples are
+    // looked up in parallel and added one after the other, in an order that is always the same.
+    std::vector<Sample> samples;
+    const auto addUp = [&](int width, int height, const auto& directionOf) {
+        const int rows = std::max(1, kSamplesAtOnce / width);
+        for (int first = 0; first < height; first += rows) {
+            const int end = std::min(height, first + rows);
+            samples.resize(static_cast<std::size_t>(end - first) * width);
+            parallelFor(first, end, 4, [&](int y) {
+                Sample* to = samples.data() + static_cast<std::size_t>(y - first) * width;
+                for (int x = 0; x < width; ++x, ++to) {
+                    double solidAngle = 0;
+                    const glm::vec3 d(directionOf(x, y, solidAngle));
+                    to->solidAngle = static_cast<float>(solidAngle);
+                    to->piece = pieceOf(d);
+                    to->light = glm::vec3(sampleTurned(d, 0, true)) * to->solidAngle;
+                }
+            });
+            for (const Sample& s : samples)
+                sums[s.piece] += glm::dvec4(glm::dvec3(s.light), s.solidAngle);
+        }
+    };
+    // How often each of `texels` is sampled so that there are `least` samples.
+    const auto often = [](int texels, int least) { return (least + texels - 1) / texels; };
+    if (pictures_ && !pictures_->cube) {
+        const glm::ivec2 size = pictures_->sizeOf(0);
+        const int width = size.x * often(size.x, 4 * side * kSamplesOfPiece);
+        const int height = size.y * often(size.y, 2 * side * kSamplesOfPiece);
+        // Directions of columns at the horizon.
+        std::vector<glm::dvec3> columns;
+        for (int x = 0; x < width; ++x)
+            columns.push_back(latlongDirection({(x + 0.5) / width, 0.5}));
+        addUp(width, height, [&](int x, int y, double& solidAngle) {
+            const auto sineAt = [&](double row) {
+                return std::cos(glm::pi<double>() * row / height);
+            };
+            solidAngle = glm::two_pi<double>() / width * (sineAt(y) - sineAt(y + 1.0));
+            const double sine = sineAt(y + 0.5);
+            const glm::dvec3 across = columns[x] * std::sqrt(std::max(0.0, 1 - sine * sine));
+            return glm::dvec3(across.x, sine, across.z);
+        });
+    } else {
+        for (std::size_t f = 0; f < 6; ++f) {
+            const int texels = pictures_ ? std::max(1, pictures_->sizeOf(f).x) : 1;
+            const int width = texels * often(texels, side * kSamplesOfPiece);
+            addUp(width, width, [&](int x, int y, double& solidAngle) {
+                const glm::dvec3 d =
+                    faceDirection(static_cast<CubeFace>(f), {(x + 0.5) / width, (y + 0.5) / width});
+                const double length = glm::length(d);
+                solidAngle = 4.0 / width / width / (length * length * length);
+                return d / length;
+            });
+        }
+    }
+    std::vector<EnvironmentPiece> pieces(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto row = static_cast<int>(i) / side, column = static_cast<int>(i) % side;
+        EnvironmentPiece& piece = pieces[i];
+        piece.direction = glm::vec3(
+            glm::normalize(faceDirection(static_cast<CubeFace>(row / side),
+                                         {(column + 0.5) / side, (row % side + 0.5) / side})));
+        piece.light = glm::vec3(sums[i]);
+        piece.solidAngle = static_cast<float>(sums[i].w);
+    }
+    return pieces;
 }
 
 glm::vec4 EnvironmentMap::pictureAt(glm::vec3 d) const {

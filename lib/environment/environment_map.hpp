@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include <glm/glm.hpp>
 
@@ -8,6 +9,13 @@
 #include "lib/model/environment.hpp"
 
 namespace stx {
+
+/// A piece of the sphere of directions, and the light that comes from it.
+struct EnvironmentPiece {
+    glm::vec3 direction{0.0f};  ///< its middle, unit, in the world
+    float solidAngle = 0;       ///< of what was added up, steradians
+    glm::vec3 light{0.0f};      ///< linear light times steradians, added up; none where nothing is
+};
 
 /// An environment made ready to be looked up: pictures with smaller ones for wide footprints
 /// (averaged in linear light) and borders from across their edges, so that faces join without a
@@ -38,6 +46,13 @@ class EnvironmentMap {
     [[nodiscard]] glm::vec4 pictureAt(glm::vec3 d) const;
     /// Pictures only, averaged over an angle; else as pictureAt().
     [[nodiscard]] glm::vec4 pictureAt(glm::vec3 d, float footprintRad) const;
+
+    /// All the light that there is, by where it comes from: six faces (faceDirection()) of the
+    /// world's axes in side x side pieces, row by row. Each texel counts once or more, with its
+    /// solid angle, so that a sun of a single texel gives what it has. The solid angles of a piece
+    /// may differ a little from its own; of all they add up to the sphere. The same on any number
+    /// of threads. Takes 32 bytes for each piece, and 10 MiB.
+    [[nodiscard]] std::vector<EnvironmentPiece> pieces(int side) const;
 
   private:
     struct Pictures;

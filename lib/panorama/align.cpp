@@ -520,12 +520,25 @@ Result<PictureTree> leaveOutStrangers(PictureSource& source, const std::vector<i
     return tree;
 }
 
+/// The rotation into a world that is level; a note where up is a guess.
+glm::dquat levelOf(const Series& s, PictureSource& source, bool closed, Job& job) {
+    std::vector<bool> oriented;
+    for (int k = 0; k < source.count(); ++k) oriented.push_back(source.oriented(k));
+    const UpOfTurn found = findUp(s.model, oriented);
+    if (found.byOwnTops)
+        job.note(
+            "the pictures are one above the other, or on their sides: their own tops are taken for "
+            "up; turn them upright where that is wrong, or --up first takes the first one's frame");
+    return levelTurn(s.model, found.up, closed);
+}
+
 /// The cameras of the model in the world that `up` asks for.
-void describeCameras(const Series& s, PanoramaUp up, PanoramaAlignment& out) {
+void describeCameras(const Series& s, PictureSource& source, PanoramaUp up, PanoramaAlignment& out,
+                     Job& job) {
     const auto first = static_cast<std::size_t>(
         std::find(s.model.known.begin(), s.model.known.end(), true) - s.model.known.begin());
     const glm::dquat turn = up == PanoramaUp::first ? glm::inverse(s.model.worldFromCamera[first])
-                                                    : levelTurn(s.model, upOf(s.model), out.closed);
+                                                    : levelOf(s, source, out.closed, job);
     out.focal = s.model.lens.focal;
     out.k1 = s.model.lens.k1;
     for (std::size_t k = 0; k < s.copies.size(); ++k) {
@@ -577,7 +590,7 @@ Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSet
         out.gapBefore = gapOf(byPairs, s.pairs, closing, true);
         out.gapAfter = gapOf(s.model, s.pairs, closing, false);
     }
-    describeCameras(s, settings.up, out);
+    describeCameras(s, source, settings.up, out, job);
     noteParallax(out.pairs, source, std::max(kLeastParallax, 2 * kParallaxShare * largest),
                  focalGiven, job);
     return out;

@@ -34,9 +34,22 @@ struct PictureTree {
 [[nodiscard]] double focalByClosing(const PictureTree& tree, const std::vector<Pair>& pairs,
                                     double focal);
 
-/// What is up, a unit vector: the direction in which the pictures most likely have their upper edge
-/// or a side. Each camera may be rolled.
-[[nodiscard]] glm::dvec3 upOf(const TurnModel& model);
+/// What is up, and what that follows from.
+struct UpOfTurn {
+    glm::dvec3 up{0, 1, 0};  ///< unit
+    /// The pictures may as well be on their side, one beside the other, as upright, one above the
+    /// other: upright is taken, since none says how it was held.
+    bool byOwnTops = false;
+};
+
+/// What is up: the direction in which the pictures most likely have their upper edge or a side.
+/// Each camera may be rolled. `oriented`: of each picture, whether its camera wrote down how it was
+/// held, by which it is upright; empty = none did.
+[[nodiscard]] UpOfTurn findUp(const TurnModel& model, const std::vector<bool>& oriented);
+/// The same where no camera wrote that down.
+[[nodiscard]] inline glm::dvec3 upOf(const TurnModel& model) {
+    return findUp(model, {}).up;
+}
 
 /// The pairs that close a full turn: they are not in the tree, and the way through it from one of
 /// their pictures to the other and back by the pair goes once all around. Indices of pairs.

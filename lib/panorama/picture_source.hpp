@@ -21,6 +21,9 @@ class PictureSource {
     /// Its focal length in halves of the picture's diagonal, when the camera wrote one down; 0 =
     /// not known.
     [[nodiscard]] virtual double focalHint(int k) const = 0;
+    /// Whether the camera wrote down how it was held, by which picture() is upright; false: a
+    /// picture may be on its side.
+    [[nodiscard]] virtual bool oriented(int /*k*/) const { return false; }
 };
 
 /// The picture with alpha 255 where it shows more than it hides, else 0 and the colours of what is

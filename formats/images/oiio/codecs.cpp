@@ -198,9 +198,12 @@ void turnWhiteIsZero(const OIIO::ImageSpec& spec, const OIIO::TypeDesc& type, vo
 }
 
 /// Radiance's resolution line says where rows begin, and whether they are columns; the library
-/// gives that as an orientation of EXIF and leaves the pixels as they are stored.
+/// gives that as an orientation of EXIF and leaves the pixels as they are stored. Its 6 is +X +Y
+/// (columns from the left, each from below) and its 8 is -X -Y, which EXIF counts the other way.
 int orientationOf(const OIIO::ImageSpec& spec, const std::string& format) {
-    return format == "hdr" ? spec.get_int_attribute("Orientation", 1) : 1;
+    if (format != "hdr") return 1;
+    const int orientation = spec.get_int_attribute("Orientation", 1);
+    return orientation == 6 ? 8 : orientation == 8 ? 6 : orientation;
 }
 
 /// Bytes of the file, of which some that were asked for are not there.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "formats/images/codec_module.hpp"
 #include "formats/images/exif.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/summary.hpp"
@@ -77,6 +78,27 @@ struct TurnedBeside {
         const auto summary = summariseImageSet(folder / "a.jpg", job);
         return summary && summary->photo ? summary->photo->uprightSize(summary->photo->depth)
                                          : glm::ivec2(0);
+    }
+};
+
+/// A photo of 96x64 in any file, with depth of one distance beside it.
+struct FlatBeside {
+    TemporaryFolder folder;
+    ImageSetOptions options;
+    std::string notes;
+
+    FlatBeside() {
+        writeExr(folder / "a_depth.exr", {{"Z", plane(96, 64, [](int, int) { return 3; })}});
+        options.from = "photo";
+        options.refine = *RefineSettings::from("off");
+    }
+    [[nodiscard]] Result<ReferenceView> read(const std::string& name) {
+        Job job;
+        auto bundle = readImageSet(folder / name, options, job);
+        if (!bundle) return tl::unexpected(bundle.error());
+        notes.clear();
+        for (const std::string& note : job.takeNotes()) notes += note + "\n";
+        return std::move(bundle->views[0]);
     }
 };
 
@@ -276,4 +298,127 @@ TEST(PhotoDepth, DepthWhoseSizeDoesNotTellIsTakenAsUpright) {
         expectUpright(view->depth);
         EXPECT_EQ(photo.notesSay("is taken as upright"), orientation == 3);
     }
+}
+
+/// What a picture cuts out is not there.
+TEST(PhotoDepth, AlphaOfThePictureIsItsCoverage) {
+    for (const int bits : {8, 16}) {
+        for (const bool cut : {true, false}) {
+            SCOPED_TRACE(fmt::format("{} bits, {}", bits, cut ? "cut out" : "opaque"));
+            FlatBeside photo;
+            std::vector<std::uint8_t> bytes;
+            std::vector<std::uint16_t> words;
+            for (int y = 0; y < 64; ++y)
+                for (int x = 0; x < 96; ++x)
+                    for (const int v : {200, 100, 50, cut && x < 48 ? 0 : 255}) {
+                        bytes.push_back(static_cast<std::uint8_t>(v));
+                        words.push_back(static_cast<std::uint16_t>(257 * v));
+                    }
+            const auto png = encodePng(96, 64, 4, bits,
+                                       bits == 8 ? static_cast<const void*>(bytes.data())
+                                                 : static_cast<const void*>(words.data()),
+                                       true);
+            ASSERT_TRUE(png);
+            writeBytes(photo.folder / "a.png", *png);
+            const auto view = photo.read("a.png");
+            ASSERT_TRUE(view) << view.error().text();
+            EXPECT_NEAR(view->texture.at(20, 30).a, cut ? 0 : 1, 1e-6);
+            EXPECT_EQ(hasPoint(view->depth.at(20, 30)), !cut);
+            EXPECT_NEAR(view->texture.at(70, 30).a, 1, 1e-6);
+            EXPECT_TRUE(hasPoint(view->depth.at(70, 30)));
+        }
+    }
+}
+
+TEST(PhotoDepth, ColourOfMoreThan8BitsIsKeptOrNoted) {
+    FlatBeside photo;
+    const std::vector<std::uint16_t> words(std::size_t{96} * 64 * 3, 25700 + 100);
+    const auto png = encodePng(96, 64, 3, 16, words.data(), true);
+    ASSERT_TRUE(png);
+    writeBytes(photo.folder / "a.png", *png);
+    const auto rounded = photo.read("a.png");
+    ASSERT_TRUE(rounded) << rounded.error().text();
+    EXPECT_FALSE(rounded->texture.isLinear());
+    EXPECT_NE(photo.notes.find("colour of 16 bits is rounded to 8"), std::string::npos)
+        << photo.notes;
+    photo.options.deepColour = true;
+    const auto deep = photo.read("a.png");
+    ASSERT_TRUE(deep) << deep.error().text();
+    ASSERT_TRUE(deep->texture.isLinear());
+    EXPECT_NEAR(65535 * srgbFromLinear(deep->texture.at(5, 5).r), 25800, 0.5);
+    EXPECT_EQ(photo.notes.find("rounded"), std::string::npos) << photo.notes;
+
+    // Light beyond white.
+    photo.options.deepColour = false;
+    const auto bright = plane(96, 64, [](int x, int) { return x < 48 ? 4 : 1; });
+    writeExr(photo.folder / "a.exr", {{"R", bright}, {"G", bright}, {"B", bright}});
+    const auto light = photo.read("a.exr");
+    ASSERT_TRUE(light) << light.error().text();
+    ASSERT_TRUE(light->texture.isLinear());
+    EXPECT_EQ(light->texture.at(5, 5).g, 4.0f);
+}
+
+/// Whose size only decoding shows.
+TEST(PhotoDepth, AWebpThatExifTurnsHasItsDepth) {
+    for (const int orientation : {5, 6, 8}) {
+        SCOPED_TRACE(orientation);
+        TurnedBeside photo(orientation);
+        photo.options.photo.nearIs = NearIs::unknown;
+        photo.options.depthMin = photo.options.depthMax = 0;
+        std::filesystem::remove(photo.folder / "a.jpg");
+        // Its first column is red.
+        std::vector<std::uint8_t> rgb;
+        for (int y = 0; y < 64; ++y)
+            for (int x = 0; x < 96; ++x)
+                for (const int v : {x == 0 ? 255 : 0, 80, 40})
+                    rgb.push_back(static_cast<std::uint8_t>(v));
+        const std::string file = (photo.folder / "a.webp").string();
+        const auto table = loadCodecs();
+        ASSERT_TRUE(table) << table.error().text();
+        codecs::EncodeRequest request;
+        request.path = file.c_str();
+        request.format = "webp";
+        request.width = 96;
+        request.height = 64;
+        request.channels = 3;
+        request.values = rgb.data();
+        codecs::Failure failure;
+        ASSERT_TRUE((*table)->encode(request, failure)) << failure.message;
+        auto bytes = readFile(file, Limits());
+        ASSERT_TRUE(bytes);
+        // What follows the marker and the length of a JPEG's segment.
+        const Bytes segment = made::exifSegment(orientation, 28);
+        made::append(*bytes, "EXIF");
+        made::appendLittle(*bytes, static_cast<std::uint32_t>(segment.size() - 4));
+        made::append(*bytes, ByteSpan(segment).subspan(4));
+        if (segment.size() % 2 == 1) bytes->push_back(std::byte{0});
+        writeBytes(file, *bytes);
+        writeExr(photo.folder / "a_depth.exr",
+                 {{"Z", plane(64, 96, [](int, int y) { return y < 48 ? 2 : 4; })}});
+        Job job;
+        const auto read = readImageSet(file, photo.options, job);
+        ASSERT_TRUE(read) << read.error().text();
+        const ReferenceView& view = read->views[0];
+        ASSERT_EQ(glm::ivec2(view.texture.width(), view.texture.height()), glm::ivec2(64, 96));
+        ASSERT_EQ(view.depth.size(), glm::ivec2(64, 96));
+        EXPECT_NEAR(view.texture.at(30, orientation == 8 ? 95 : 0).r, 1, 1e-6);
+        EXPECT_EQ(view.depth.at(30, 10), 2.0f);
+    }
+}
+
+/// The ending alone says what such a file is.
+TEST(PhotoDepth, ATgaIsAPhotoToo) {
+    FlatBeside photo;
+    std::string tga(18, '\0');
+    tga[2] = 2;  // colours
+    tga[12] = 96;
+    tga[14] = 64;
+    tga[16] = 24;  // bits
+    tga[17] = 32;  // from the top
+    for (int i = 0; i < 96 * 64; ++i) tga += {10, 20, 30};
+    writeText(photo.folder / "a.tga", tga);
+    const auto view = photo.read("a.tga");
+    ASSERT_TRUE(view) << view.error().text();
+    EXPECT_EQ(glm::round(view->texture.at(40, 30) * 255.0f), glm::vec4(30, 20, 10, 255));
+    EXPECT_EQ(view->depth.at(40, 30), 3.0f);
 }

@@ -169,6 +169,47 @@ TEST(PictureLevel, UpIsTheAxisWhereAllLookSteeplyUpOrDown) {
         }
 }
 
+TEST(PictureLevel, PicturesOneAboveTheOtherAreUpright) {
+    const glm::dquat askew = glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, -1)));
+    const glm::dvec3 up = askew * glm::dvec3(0, 1, 0);
+    const auto above = [&](double from, double step, int pictures) {
+        TurnModel model = turnedBy(0, pictures, {1, 0});
+        for (int k = 0; k < pictures; ++k)
+            model.worldFromCamera[static_cast<std::size_t>(k)] =
+                askew * heldAt(170 + 0.3 * k, from + step * k, k % 2 == 0 ? 0.2 : -0.2);
+        return model;
+    };
+    const double upright = std::cos(2 * kDegree);
+    for (const TurnModel& model : {above(-30, 20, 4), above(-40, 10, 9), above(-70, 20, 8)}) {
+        const std::vector<bool> oriented(model.known.size(), true);
+        const UpOfTurn found = findUp(model, oriented);
+        EXPECT_GT(glm::dot(found.up, up), upright);
+        EXPECT_FALSE(found.byOwnTops);
+    }
+    // Where nobody says how they were held it is a guess.
+    const UpOfTurn guessed = findUp(above(-30, 20, 4), {});
+    EXPECT_GT(glm::dot(guessed.up, up), upright);
+    EXPECT_TRUE(guessed.byOwnTops);
+}
+
+TEST(PictureLevel, PortraitsOnTheirSideAreTurnedWhereTheyGoAround) {
+    TurnModel model = turnedBy(0, 12, {1, 0});
+    for (int k = 0; k < 12; ++k)
+        model.worldFromCamera[static_cast<std::size_t>(k)] = heldAt(30 * k, 2, 90);
+    // Cameras without a sense of how they are held write the same into each.
+    for (const bool oriented : {false, true}) {
+        const UpOfTurn found = findUp(model, std::vector<bool>(12, oriented));
+        EXPECT_GT(glm::dot(found.up, glm::dvec3(0, 1, 0)), std::cos(0.5 * kDegree)) << oriented;
+        EXPECT_FALSE(found.byOwnTops);
+    }
+    // One of them tells nothing that the others do not.
+    TurnModel few = turnedBy(0.4, 6, {1, 0});
+    few.worldFromCamera[2] = few.worldFromCamera[2] * heldAt(0, 0, 90);
+    const UpOfTurn found = findUp(few, {});
+    EXPECT_GT(glm::dot(found.up, glm::dvec3(0, 1, 0)), std::cos(0.5 * kDegree));
+    EXPECT_FALSE(found.byOwnTops);
+}
+
 TEST(PictureLevel, TheMiddleOfWhatIsSeenLiesAhead) {
     // Three pictures from 60 to 120 degrees to the left, around an axis that is askew.
     const glm::dquat askew = glm::angleAxis(1.1, glm::normalize(glm::dvec3(2, 1, 1)));
