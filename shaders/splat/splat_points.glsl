@@ -44,10 +44,9 @@ bool fetchPoint(uint task, uint lane, out Point p, out ivec3 texel) {
     p.flatFrame = orthographic();
     if (!placePoint(p, float((uv & 0xffffu) + dx), float((uv >> 16u) + dy))) return false;
 #if TRANSLUCENT
-    // Pixels less than half covered belong to the silhouette: they lend colour but hide nothing.
     float alpha = texelFetch(colourTexture, texel, 0).a;
 #if PASS == 1 && RULE != 0
-    if (!(alpha > 0.5)) return false;
+    if (!(alpha >= kHides)) return false;
 #else
     if (!(alpha > 0.0)) return false;
 #endif

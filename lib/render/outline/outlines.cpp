@@ -26,7 +26,8 @@ constexpr std::size_t kMostViews = 24, kSides = 8;
 /// The outline of less even surroundings has no direction; of the sum of weights.
 constexpr float kLeastDirection = 0.15f;
 
-/// Whether a texel is a point: covered by half or more, as what hides in splat mode is.
+/// Whether a texel is a point: covered by half or more, as what hides in splat mode
+/// is (kHides).
 bool solid(const PageSet& set, const GlassPages* glass, std::size_t page, std::size_t texel) {
     if (set.pages()[page].texture->alpha(texel) >= 0.5f) return true;
     return glass && glass->coverage(page, texel) > 127;

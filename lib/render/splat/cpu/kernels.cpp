@@ -121,7 +121,7 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
             const int count = t.u1 - t.u0 - i;
             Splats p = splatsOf<kUniform, false>(d, s, t, map, v - t.v0, i, pixel, count, region);
             if (!t.opaque) {
-                const auto solid = alphaAbove(d, s, pixel, count, 127);
+                const auto solid = hides(d, alphaOf(d, s, pixel, count));
                 p.small = hn::And(p.small, solid);
                 p.large = hn::And(p.large, solid);
             }
@@ -285,7 +285,7 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
             const int count = t.u1 - t.u0 - i;
             Splats p = splatsOf<kUniform, true>(d, s, t, map, v - t.v0, i, pixel, count, region);
             if (!kOpaque) {
-                const auto any = alphaAbove(d, s, pixel, count, 0);
+                const auto any = hn::Gt(alphaOf(d, s, pixel, count), hn::Zero(d));
                 p.small = hn::And(p.small, any);
                 p.large = hn::And(p.large, any);
             }
@@ -330,17 +330,19 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
 
 // --- SplatRule::paper ------------------------------------------------------------------------
 
-// Calls draw(pixel, splat) for each point of a block as a round splat.
-template <class F>
+// Calls draw(pixel, splat) for each point of a block as a round splat; kHiding: for those that hide
+// what is behind.
+template <bool kHiding, class F>
 HWY_INLINE void forRound(const RectangleImages& s, const BlockTask& t, const Shape& shape,
-                         const Region& region, int alphaThreshold, const F& draw) {
+                         const Region& region, const F& draw) {
     for (int v = t.v0; v < t.v1; ++v) {
         const RowMap map(s.map, t.u0, v);
         for (int u = t.u0; u < t.u1; ++u) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + u;
             const float alpha =
                 s.rgba8 ? s.rgba8[4 * pixel + 3] : s.rgbaFloat[4 * pixel + 3] * 255.0f;
-            if (!(s.depth[pixel] < kInfinity) || !(alpha > alphaThreshold)) continue;
+            if (!(s.depth[pixel] < kInfinity)) continue;
+            if (kHiding ? !(alpha >= 255.0f * kHides) : !(alpha > 0.0f)) continue;
             float h[3];
             for (int k = 0; k < 3; ++k) {
                 const float i = static_cast<float>(u - t.u0);
@@ -378,7 +380,8 @@ void pointsImpl(const RectangleImages& s, const BlockTask& t, const Region& regi
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
             Projection p = project(d, map, i, loadDepth(d, s.depth + pixel, count), region);
-            if (!t.opaque) p.inside = hn::And(p.inside, alphaAbove(d, s, pixel, count, 0));
+            if (!t.opaque)
+                p.inside = hn::And(p.inside, hn::Gt(alphaOf(d, s, pixel, count), hn::Zero(d)));
             std::uint32_t bits = bitsOf(d, p.inside);
             if (!bits) continue;
             // The nearest of the four pixels.
@@ -405,8 +408,8 @@ void depthImpl(const RectangleImages& s, const BlockTask& t, const Ahead& ahead,
                const Region& region) {
     const DF d;
     if (shape.coefficient > 0) {
-        forRound(s, t, shape, region, 127,
-                 [&](std::size_t, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, region); });
+        forRound<true>(s, t, shape, region,
+                       [&](std::size_t, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, region); });
     } else if (t.uniform) {
         depthBlock<true>(s, t, ahead, region);
     } else {
@@ -431,7 +434,7 @@ void colourImpl(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
                 const Shape& shape, const Region& region) {
     const DF d;
     if (shape.coefficient > 0) {
-        forRound(s, t, shape, region, 0, [&](std::size_t pixel, const Ellipse& e) HWY_ATTR {
+        forRound<false>(s, t, shape, region, [&](std::size_t pixel, const Ellipse& e) HWY_ATTR {
             const PointColour point = pointColourOf(s, pixel, t.opaque);
             if (s.normals)
                 colourEllipse<false, true>(d, e, point, t.tolerance, region);
