@@ -4,7 +4,7 @@
 // Nearer than this the projection means nothing.
 CONSTANT float kNearest = 1e-12f;
 // Points with this alpha or more, half of a pixel, hide what is behind them. Those of less belong to a
-// silhouette: they lend colour but hide nothing. No code of 8 bits is equal to it, but floats are.
+// silhouette: they lend colour but hide nothing, unless they are glass (splat::Slope). No code of 8 bits is equal to it, but floats are.
 CONSTANT float kHides = 0.5f;
 // A splat closes its gaps within 2x2 pixels while no point of the surface is farther from a sample
 // than this, squared.

@@ -11,6 +11,7 @@ struct Point {
     vec2 pixel;    // novel frame, centres at whole numbers
     float dist;    // from the novel camera
     bool flatFrame;  // the novel camera is orthographic
+    bool opaque;     // of full alpha
 };
 
 // Places pixel (u, v) of p.view with its distance p.source; false when it is behind the camera.
@@ -93,7 +94,8 @@ Splat paperSplat(Point p, float coefficient) {
 // From the point's own data: its coded slopes (splat::Slope) and its size, 1 = closes the lattice.
 // False when it faces away.
 bool ownSplat(Point p, int codeU, int codeV, float size, bool allSmall, OUT(Splat) s) {
-    bool linked = (codeU & 1) != 0, rim = (codeV & 1) != 0;
+    // Of what is not opaque the flag says that it is glass.
+    bool linked = p.opaque && (codeU & 1) != 0, rim = (codeV & 1) != 0;
     float inverse = p.flatFrame ? 1.0f : 1.0f / p.h.z;
     float back = p.flatFrame ? 0.0f : 1.0f;
     float spacing = p.view.a0.w != 0.0f ? 1.0f : p.source;

@@ -43,13 +43,15 @@ bool fetchPoint(uint task, uint lane, out Point p, out ivec3 texel) {
     p.view = viewAt(viewLayer & 0xfffffu);
     p.flatFrame = orthographic();
     if (!placePoint(p, float((uv & 0xffffu) + dx), float((uv >> 16u) + dy))) return false;
+    p.opaque = true;
 #if TRANSLUCENT
     float alpha = texelFetch(colourTexture, texel, 0).a;
-#if PASS == 1 && RULE != 0
-    if (!(alpha >= kHides)) return false;
-#else
     if (!(alpha > 0.0)) return false;
+#if PASS == 1 && RULE != 0
+    // Glass hides whatever its alpha is: see splat::Slope.
+    if (!(alpha >= kHides) && (texelFetch(slopeTexture, texel, 0).x & 1) == 0) return false;
 #endif
+    p.opaque = alpha >= 1.0;
 #endif
     return true;
 }

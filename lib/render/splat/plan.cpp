@@ -195,6 +195,7 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
     task.u1 = block.u1;
     task.v1 = block.v1;
     task.opaque = block.opaque;
+    task.glass = block.glass;
     const Corners corners = cornersOf(block, s.map, novel.orthographic);
     if (!(corners.zMax > 0)) return false;
     const bool crossing = !(corners.zMin > kCrossing * corners.zMax);

@@ -95,6 +95,7 @@ Drawn drawScalar(const Inputs& in) {
             p.view = in.viewEntry();
             p.source = in.depth[k];
             p.flatFrame = in.novel.orthographic;
+            p.opaque = true;
             const int u = i % kBlock, v = i / kBlock;
             if (!hasPoint(p.source) ||
                 !shape.placePoint(p, static_cast<float>(u), static_cast<float>(v)))

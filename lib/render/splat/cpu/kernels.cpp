@@ -121,7 +121,8 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
             const int count = t.u1 - t.u0 - i;
             Splats p = splatsOf<kUniform, false>(d, s, t, map, v - t.v0, i, pixel, count, region);
             if (!t.opaque) {
-                const auto solid = hides(d, alphaOf(d, s, pixel, count));
+                auto solid = hides(d, alphaOf(d, s, pixel, count));
+                if (t.glass) solid = hn::Or(solid, glassOf(d, s, pixel, count));
                 p.small = hn::And(p.small, solid);
                 p.large = hn::And(p.large, solid);
             }
@@ -342,7 +343,9 @@ HWY_INLINE void forRound(const RectangleImages& s, const BlockTask& t, const Sha
             const float alpha =
                 s.rgba8 ? s.rgba8[4 * pixel + 3] : s.rgbaFloat[4 * pixel + 3] * 255.0f;
             if (!(s.depth[pixel] < kInfinity)) continue;
-            if (kHiding ? !(alpha >= 255.0f * kHides) : !(alpha > 0.0f)) continue;
+            const bool solid =
+                alpha >= 255.0f * kHides || (t.glass && s.slopes[pixel].u & Slope::kGlass);
+            if (kHiding ? !solid : !(alpha > 0.0f)) continue;
             float h[3];
             for (int k = 0; k < 3; ++k) {
                 const float i = static_cast<float>(u - t.u0);

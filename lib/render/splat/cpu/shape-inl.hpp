@@ -30,20 +30,29 @@ struct Splats {
     VF uAcross, vAcross, uDown, vDown;
 };
 
+// Slopes and their flags of up to a vector of pixels, u in the lower half of each lane.
+HWY_INLINE VI packedSlopes(const RectangleImages& s, std::size_t pixel, int count) {
+    const DI di;
+    static_assert(sizeof(Slope) == 4 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
+    if (count >= static_cast<int>(hn::Lanes(di)))
+        return hn::LoadU(di, reinterpret_cast<const std::int32_t*>(s.slopes + pixel));
+    HWY_ALIGN std::int32_t padded[kBlock] = {};
+    std::memcpy(padded, s.slopes + pixel, static_cast<std::size_t>(count) * sizeof(Slope));
+    return hn::Load(di, padded);
+}
+
+// Which of the pixels of a block with glass are glass, or opaque.
+HWY_INLINE hn::Mask<DF> glassOf(DF d, const RectangleImages& s, std::size_t pixel, int count) {
+    const VI packed = packedSlopes(s, pixel, count);
+    return hn::RebindMask(d, hn::TestBit(packed, hn::Set(DI(), Slope::kGlass)));
+}
+
 // Slopes, sizes and links of up to a vector of pixels.
 HWY_INLINE void loadShape(DF d, const RectangleImages& s, std::size_t pixel, int count, VF& u,
                           VF& v, VF& size, hn::Mask<DF>& linked, hn::Mask<DF>& rim) {
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
-    static_assert(sizeof(Slope) == 4 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
-    VI packed;
-    if (count >= lanes) {
-        packed = hn::LoadU(di, reinterpret_cast<const std::int32_t*>(s.slopes + pixel));
-    } else {
-        HWY_ALIGN std::int32_t padded[kBlock] = {};
-        std::memcpy(padded, s.slopes + pixel, static_cast<std::size_t>(count) * sizeof(Slope));
-        packed = hn::Load(di, padded);
-    }
+    const VI packed = packedSlopes(s, pixel, count);
     u = hn::ConvertTo(d, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed)));
     v = hn::ConvertTo(d, hn::ShiftRight<16>(packed));
     linked = hn::RebindMask(d, hn::TestBit(packed, hn::Set(di, Slope::kLinked)));
@@ -163,6 +172,9 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
     VF su, sv, size;
     hn::Mask<DF> linked, rim;
     loadShape(d, s, pixel, count, su, sv, size, linked, rim);
+    // Of what is not opaque the flag says that it is glass.
+    if (kColour && t.glass)
+        linked = hn::And(linked, hn::Ge(alphaOf(d, s, pixel, count), hn::Set(d, 255.0f)));
     const VF spacing = s.orthographic ? one : depth;
     const VF du = hn::Mul(su, hn::Mul(spacing, hn::Set(d, 1.0f / (kSlopeScale * s.fx))));
     const VF dv = hn::Mul(sv, hn::Mul(spacing, hn::Set(d, 1.0f / (kSlopeScale * s.fy))));
