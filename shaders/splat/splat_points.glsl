@@ -42,6 +42,7 @@ bool fetchPoint(uint task, uint lane, out Point p, out ivec3 texel) {
     if (!(p.source < kFarAway)) return false;
     p.view = viewAt(viewLayer & 0xfffffu);
     p.flatFrame = orthographic();
+    p.largest = frame.scales.z;
     if (!placePoint(p, float((uv & 0xffffu) + dx), float((uv >> 16u) + dy))) return false;
     p.opaque = true;
 #if TRANSLUCENT

@@ -1,6 +1,7 @@
 #include "lib/render/splat/plan.hpp"
 
 #include <cmath>
+#include <limits>
 
 #include "lib/render/splat/constants.hpp"
 #include "lib/render/splat/others.hpp"
@@ -235,6 +236,12 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
     task.nearest = 0.999f * least * task.zMin / (1.0f + task.tolerance);
 
     return setReach(corners, crossing, cover2, novel, task);
+}
+
+float largestSplat(const Camera& novel) {
+    if (novel.orthographic) return std::numeric_limits<float>::max();
+    return std::max(kLargest,
+                    kLargestShare * static_cast<float>(std::max(novel.width, novel.height)));
 }
 
 }  // namespace stx::splat

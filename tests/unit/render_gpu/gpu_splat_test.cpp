@@ -126,6 +126,19 @@ TEST_P(GpuSplat, AgreesWithTheCpuFromFarAway) {
     }
 }
 
+/// A thousandth of a unit of a wall, whose samples lie hundreds of pixels and more apart.
+TEST_P(GpuSplat, FillsOrthographicCloseUps) {
+    const Bundle bundle = test::smallRoom(1, 128);
+    Camera camera = bundle.views[0].camera.resized(160, 120);
+    camera.orthographic = true;
+    camera.fx = camera.fy = 160 / 0.001;
+    camera.cx = 80;
+    camera.cy = 60;
+    const auto frame = draw(bundle, splatSettings(), camera);
+    test::expectAgreement(frame, drawOnCpu(bundle, splatSettings(), camera), "close-up");
+    for (const float d : frame->depth.pixels()) ASSERT_TRUE(hasPoint(d));
+}
+
 TEST_P(GpuSplat, DrawsFramesLargerThanOnePiece) {
     const Bundle bundle = test::smallRoom(1, 64);
     Camera camera = bundle.views[0].camera.resized(4500, 40);

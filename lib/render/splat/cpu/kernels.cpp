@@ -354,7 +354,7 @@ HWY_INLINE void forRound(const RectangleImages& s, const BlockTask& t, const Sha
             if (!(h[2] > kNearest)) continue;
             const float inverse = region.orthographic ? 1.0f : 1.0f / h[2];
             const float radius =
-                std::min(std::max(0.5f, 0.5f * shape.coefficient * inverse), kLargest);
+                std::min(std::max(0.5f, 0.5f * shape.coefficient * inverse), region.largest);
             const float q = kReach2 / (radius * radius);
             const float x = h[0] * inverse, y = h[1] * inverse;
             const DF d;

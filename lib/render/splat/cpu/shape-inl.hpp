@@ -131,18 +131,25 @@ HWY_INLINE void setColour(DF d, const BlockTask& t, hn::Mask<DF> linked, hn::Mas
 
 // The ellipses of large splats: the lattice's Gaussian carried into the picture, and the low-pass
 // filter added. `reach`: where they end, squared deviations.
-HWY_INLINE void setEllipses(DF d, VF size, const Jacobian& by, float reach, Splats& out) {
+HWY_INLINE void setEllipses(DF d, VF size, const Jacobian& by, VF det, float reach,
+                            const Region& region, Splats& out) {
     const auto square = [](VF x, VF y) HWY_ATTR { return hn::MulAdd(x, x, hn::Mul(y, y)); };
     const VF k = hn::Mul(hn::Mul(size, size), hn::Set(d, kSigmaSource * kSigmaSource));
     const VF low = hn::Set(d, kSigmaPixel * kSigmaPixel);
     const VF vxx = hn::MulAdd(k, square(by.xu, by.xv), low);
     const VF vyy = hn::MulAdd(k, square(by.yu, by.yv), low);
     const VF vxy = hn::Mul(k, hn::MulAdd(by.xu, by.yu, hn::Mul(by.xv, by.yv)));
-    const VF scale = hn::Div(hn::Set(d, 1.0f), hn::NegMulAdd(vxy, vxy, hn::Mul(vxx, vyy)));
+    VF determinant = hn::NegMulAdd(vxy, vxy, hn::Mul(vxx, vyy));
+    // Without cancellation where splats may be so large that nothing would be left of it.
+    if (region.orthographic) {
+        const VF area = hn::Mul(k, det);
+        determinant = hn::MulAdd(area, area, hn::Mul(low, hn::Sub(hn::Add(vxx, vyy), low)));
+    }
+    const VF scale = hn::Div(hn::Set(d, 1.0f), determinant);
     out.qxx = hn::Mul(vyy, scale);
     out.qyy = hn::Mul(vxx, scale);
     out.qxy = hn::Neg(hn::Mul(vxy, scale));
-    const VF end = hn::Set(d, reach), largest = hn::Set(d, kLargest);
+    const VF end = hn::Set(d, reach), largest = hn::Set(d, region.largest);
     out.halfX = hn::Min(hn::Sqrt(hn::Mul(end, vxx)), largest);
     out.halfY = hn::Min(hn::Sqrt(hn::Mul(end, vyy)), largest);
 }
@@ -221,7 +228,7 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
     }
     if (!hn::AllFalse(d, out.large)) {
         // The first pass draws only the core of a splat, which hides what is behind.
-        setEllipses(d, size, {xu, yu, xv, yv}, kColour ? kDrawn2 : kCore2, out);
+        setEllipses(d, size, {xu, yu, xv, yv}, det, kColour ? kDrawn2 : kCore2, region, out);
     }
     return out;
 }
