@@ -30,7 +30,7 @@ constexpr float kLeastDirection = 0.15f;
 /// is (kHides).
 bool solid(const PageSet& set, const GlassPages* glass, std::size_t page, std::size_t texel) {
     if (set.pages()[page].texture->alpha(texel) >= 0.5f) return true;
-    return glass && glass->coverage(page, texel) > 127;
+    return glass && glass->coverage(page, texel) >= kHalfGlass;
 }
 
 }  // namespace

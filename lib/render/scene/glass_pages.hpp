@@ -15,6 +15,9 @@ namespace stx {
 /// glass. Both images have one size.
 [[nodiscard]] Image<std::uint8_t> glassCoverage(const Texture& texture, const Image<float>& depth);
 
+/// From this glassCoverage() on half of a pixel or more is glass.
+inline constexpr std::uint8_t kHalfGlass = 128;
+
 /// glassCoverage() of all pages of a PageSet. In glass alpha says how much of the light it stops,
 /// and not how much of a pixel is covered, as elsewhere.
 class GlassPages {

@@ -284,8 +284,8 @@ void prepareRow(const Window& w, const Image<std::uint8_t>& glass, const glm::ma
         const auto flagged = [](std::int16_t code, bool flag) {
             return static_cast<std::int16_t>((code & ~1) | (flag ? 1 : 0));
         };
-        // Of glass itself, which half of a pixel or more shows: as of alpha elsewhere (kHides).
-        const bool isGlass = !glass.empty() && glass.data()[i] > 127;
+        // As with alpha elsewhere (kHides), half of a pixel is enough to hide what is behind.
+        const bool isGlass = !glass.empty() && glass.data()[i] >= kHalfGlass;
         out.slopes[i] = {flagged(coded(slope.x), around.linked || isGlass),
                          flagged(coded(slope.y), around.rim)};
         if (normals) {
