@@ -3,6 +3,9 @@
 
 // Nearer than this the projection means nothing.
 CONSTANT float kNearest = 1e-12f;
+// Points with this alpha or more, half of a pixel, hide what is behind them. Those of less belong to a
+// silhouette: they lend colour but hide nothing, unless they are glass (splat::Slope). No code of 8 bits is equal to it, but floats are.
+CONSTANT float kHides = 0.5f;
 // A splat closes its gaps within 2x2 pixels while no point of the surface is farther from a sample
 // than this, squared.
 CONSTANT float kSmallCover2 = 0.9f;
@@ -19,8 +22,10 @@ CONSTANT float kSigmaSource = 0.5f, kSigmaPixel = 0.3f;
 CONSTANT float kReach2 = 5.0f, kCore2 = 2.1f;
 // It is drawn up to here along either axis: all that hides, and of the rest what weighs a ninth or more.
 CONSTANT float kDrawn2 = 2.6f;
-// None is larger, in pixels from its centre: a point almost at the viewpoint would fill the frame.
-CONSTANT float kLargest = 256.0f;
+// None is larger in perspective, in pixels from its centre, or as a share of the picture's longer side where
+// that is more: a point almost at the viewpoint would fill the frame. The share is that of 256 pixels in
+// pictures of 512, where it was chosen. Orthographic pictures have no such points.
+CONSTANT float kLargest = 256.0f, kLargestShare = 0.5f;
 // Steeper planes (relative depth per pixel) are nearly edge-on and would run away.
 CONSTANT float kSteepestPlane = 0.05f;
 // Where a surface ends: the share of the squared radius that hides; beside any edge: of the

@@ -11,6 +11,8 @@ struct Point {
     vec2 pixel;    // novel frame, centres at whole numbers
     float dist;    // from the novel camera
     bool flatFrame;  // the novel camera is orthographic
+    bool opaque;     // of full alpha
+    float largest;   // how far its splat reaches at most, pixels
 };
 
 // Places pixel (u, v) of p.view with its distance p.source; false when it is behind the camera.
@@ -77,7 +79,7 @@ Splat uniformSplat(Point p) {
 
 // The paper's: round, `coefficient` pixels wide at distance 1.
 Splat paperSplat(Point p, float coefficient) {
-    float radius = min(max(0.5f, 0.5f * coefficient * (p.flatFrame ? 1.0f : 1.0f / p.dist)), kLargest);
+    float radius = min(max(0.5f, 0.5f * coefficient * (p.flatFrame ? 1.0f : 1.0f / p.dist)), p.largest);
     float q = kReach2 / (radius * radius);
     Splat s;
     s.small = false;
@@ -93,7 +95,8 @@ Splat paperSplat(Point p, float coefficient) {
 // From the point's own data: its coded slopes (splat::Slope) and its size, 1 = closes the lattice.
 // False when it faces away.
 bool ownSplat(Point p, int codeU, int codeV, float size, bool allSmall, OUT(Splat) s) {
-    bool linked = (codeU & 1) != 0, rim = (codeV & 1) != 0;
+    // Of what is not opaque the flag says that it is glass.
+    bool linked = p.opaque && (codeU & 1) != 0, rim = (codeV & 1) != 0;
     float inverse = p.flatFrame ? 1.0f : 1.0f / p.h.z;
     float back = p.flatFrame ? 0.0f : 1.0f;
     float spacing = p.view.a0.w != 0.0f ? 1.0f : p.source;
@@ -130,6 +133,6 @@ bool ownSplat(Point p, int codeU, int codeV, float size, bool allSmall, OUT(Spla
     // vxx vyy - vxy vxy without cancellation.
     float determinant = k * k * det * det + kSigmaPixel2 * (vxx + vyy - kSigmaPixel2);
     s.q = vec3(vyy / determinant, -2.0f * vxy / determinant, vxx / determinant);
-    s.reach = min(vec2(sqrt(kDrawn2 * vxx), sqrt(kDrawn2 * vyy)), vec2(kLargest));
+    s.reach = min(vec2(sqrt(kDrawn2 * vxx), sqrt(kDrawn2 * vyy)), vec2(p.largest));
     return true;
 }

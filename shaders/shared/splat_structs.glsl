@@ -9,7 +9,7 @@ struct FrameUniforms {
     vec4 novelAxisY;     // world; w = the linear light at which lit sRGB-coded colours stop
     vec4 novelAxisZ;     // world
     vec4 novelPosition;  // world; w = diameter of the paper's splat in pixels times distance
-    vec4 scales;         // weight, colour, nearest and farthest distance (raster depth)
+    vec4 scales;         // weight, colour, how far splats reach at most in pixels
     vec4 ambient;        // rgb; w: 1 an environment lights, 2 with gloss, too
     vec4 specular;       // rgb; w = shininess
 };

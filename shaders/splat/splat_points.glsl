@@ -42,15 +42,17 @@ bool fetchPoint(uint task, uint lane, out Point p, out ivec3 texel) {
     if (!(p.source < kFarAway)) return false;
     p.view = viewAt(viewLayer & 0xfffffu);
     p.flatFrame = orthographic();
+    p.largest = frame.scales.z;
     if (!placePoint(p, float((uv & 0xffffu) + dx), float((uv >> 16u) + dy))) return false;
+    p.opaque = true;
 #if TRANSLUCENT
-    // Pixels less than half covered belong to the silhouette: they lend colour but hide nothing.
     float alpha = texelFetch(colourTexture, texel, 0).a;
-#if PASS == 1 && RULE != 0
-    if (!(alpha > 0.5)) return false;
-#else
     if (!(alpha > 0.0)) return false;
+#if PASS == 1 && RULE != 0
+    // Glass hides whatever its alpha is: see splat::Slope.
+    if (!(alpha >= kHides) && (texelFetch(slopeTexture, texel, 0).x & 1) == 0) return false;
 #endif
+    p.opaque = alpha >= 1.0;
 #endif
     return true;
 }

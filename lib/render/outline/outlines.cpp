@@ -26,8 +26,11 @@ constexpr std::size_t kMostViews = 24, kSides = 8;
 /// The outline of less even surroundings has no direction; of the sum of weights.
 constexpr float kLeastDirection = 0.15f;
 
-bool solid(const Texture& texture, std::size_t texel) {
-    return texture.alpha(texel) >= 0.5f;
+/// Whether a texel is a point: covered by half or more, as what hides in splat mode
+/// is (kHides).
+bool solid(const PageSet& set, const GlassPages* glass, std::size_t page, std::size_t texel) {
+    if (set.pages()[page].texture->alpha(texel) >= 0.5f) return true;
+    return glass && glass->coverage(page, texel) >= kHalfGlass;
 }
 
 }  // namespace
@@ -104,14 +107,15 @@ struct Outlines::Band {
 Outlines::Outlines(Outlines&&) noexcept = default;
 Outlines::~Outlines() = default;
 
-Outlines::Outlines(PageSet set) : set_(std::move(set)) {
+Outlines::Outlines(PageSet set, const GlassPages* glass) : set_(std::move(set)) {
     const auto rectangles = set_.rectangles();
     std::vector<std::vector<OutlineBlock>> found(rectangles.size());
     parallelFor(0, rectangles.size(), [&](std::int64_t n) {
         set_.settle();
         const PageRectangle& r = rectangles[n];
         if (set_.views()[r.view].unread) return;
-        const Page& page = set_.pages()[r.page];
+        const auto number = static_cast<std::size_t>(r.page);
+        const Page& page = set_.pages()[number];
         for (int v = 0; v < r.height; v += kOutlineBlock) {
             for (int u = 0; u < r.width; u += kOutlineBlock) {
                 OutlineBlock b;
@@ -125,7 +129,7 @@ Outlines::Outlines(PageSet set) : set_(std::move(set)) {
                         static_cast<std::size_t>(r.pageY + y) * page.width() + r.pageX;
                     const float* depth = page.depth->data() + first;
                     for (int x = u; x < b.u1; ++x) {
-                        if (!hasPoint(depth[x]) || !solid(*page.texture, first + x)) continue;
+                        if (!hasPoint(depth[x]) || !solid(set_, glass, number, first + x)) continue;
                         b.solid[y - v] |= static_cast<std::uint16_t>(1u << (x - u));
                         b.zMin = std::min(b.zMin, depth[x]);
                         b.zMax = std::max(b.zMax, depth[x]);

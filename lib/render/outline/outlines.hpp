@@ -10,6 +10,7 @@
 #include "lib/render/api/extent.hpp"
 #include "lib/render/api/frame.hpp"
 #include "lib/render/outline/outline_points.hpp"
+#include "lib/render/scene/glass_pages.hpp"
 #include "lib/render/scene/page_set.hpp"
 
 namespace stx {
@@ -27,8 +28,9 @@ class Outlines {
     /// A pixel that is asked for, in `covered`.
     static constexpr float kAsked = -2.0f;
 
-    /// Points are those with an alpha of at least one half.
-    explicit Outlines(PageSet set);
+    /// Points are those with an alpha of at least one half, and those of which `glass`, if any,
+    /// covers as much. It is of the same set, and not kept.
+    explicit Outlines(PageSet set, const GlassPages* glass = nullptr);
     Outlines(Outlines&&) noexcept;
     ~Outlines();
 

@@ -27,28 +27,6 @@ constexpr float kFree = 0.43f * 255.0f;
 /// sqrt(300) = 17 pixels deep: the list goes as far in front and, for larger balls, farther behind.
 constexpr std::array kDepthSteps = {0, 1, 3, -2, 5, 8, -5, 12, 17, -10, 24, 32, -18, 44};
 
-/// Coverage of a texel, 0..255.
-float alphaOf(const Texture& texture, std::size_t texel) {
-    if (const auto* image = texture.rgba8()) return image->data()[texel].a;
-    return std::round(std::clamp(texture.rgbaFloat()->data()[texel].a, 0.0f, 1.0f) * 255.0f);
-}
-
-/// Coverage of all pixels of a view, 0..255.
-Image<std::uint8_t> alphaOf(const PageSet& set, std::size_t number) {
-    const Camera& camera = set.views()[number].camera;
-    Image<std::uint8_t> alpha(camera.width, camera.height);
-    for (int y = 0; y < camera.height; ++y) {
-        for (int x = 0; x < camera.width; ++x) {
-            const PageRectangle* r = set.find(number, x, y);
-            alpha.at(x, y) =
-                static_cast<std::uint8_t>(r ? alphaOf(*set.pages()[r->page].texture, r->texel(x, y))
-                                          : set.objectOutside(number, x, y) ? 255
-                                                                            : 0);
-        }
-    }
-    return alpha;
-}
-
 /// The farthest depth of a pixel that has one and of those around it.
 float farthestAround(const Image<float>& depth, int x, int y) {
     float farthest = depth.at(x, y);
@@ -79,7 +57,39 @@ void markRow(const float* depth, int count, std::uint8_t* empty, std::uint8_t* n
         near[x] = empty[x] | empty[x + 1] | empty[x + 2] | empty[x + 3] | empty[x + 4];
 }
 
+/// The alpha of a frame's surface near a pixel, some of which are covered in part: the largest
+/// within kReach.
+float alphaAround(const Frame& frame, int x, int y) {
+    float most = 0;
+    for (int v = y - kReach; v <= y + kReach; ++v)
+        for (int u = x - kReach; u <= x + kReach; ++u)
+            if (frame.colour.contains(u, v)) most = std::max(most, frame.colour.at(u, v).a);
+    return std::min(most, 1.0f);
+}
+
 }  // namespace
+
+float Silhouettes::alphaOf(const PageRectangle& r, std::size_t texel) const {
+    const auto page = static_cast<std::size_t>(r.page);
+    if (const std::uint8_t covered = glass_.coverage(page, texel)) return covered;
+    const Texture& texture = *set_.pages()[page].texture;
+    if (const auto* image = texture.rgba8()) return image->data()[texel].a;
+    return std::round(std::clamp(texture.rgbaFloat()->data()[texel].a, 0.0f, 1.0f) * 255.0f);
+}
+
+Image<std::uint8_t> Silhouettes::alphaOf(std::size_t number) const {
+    const Camera& camera = set_.views()[number].camera;
+    Image<std::uint8_t> alpha(camera.width, camera.height);
+    for (int y = 0; y < camera.height; ++y) {
+        for (int x = 0; x < camera.width; ++x) {
+            const PageRectangle* r = set_.find(number, x, y);
+            alpha.at(x, y) = static_cast<std::uint8_t>(r ? alphaOf(*r, r->texel(x, y))
+                                                       : set_.objectOutside(number, x, y) ? 255.0f
+                                                                                          : 0.0f);
+        }
+    }
+    return alpha;
+}
 
 /// Coverage within kReach of each pixel; mixed where that leaves the picture.
 Image<Silhouettes::Around> Silhouettes::aroundOf(const Image<std::uint8_t>& alpha) {
@@ -129,15 +139,14 @@ float Silhouettes::alphaBilinear(const View& view, double x, double y) const {
         return between(a[0], a[1], b[0], b[1]);
     }
     const PageRectangle* r = set_.find(view.number, ix, iy, ix + 1, iy + 1);
-    const Texture* texture = r ? set_.pages()[r->page].texture : nullptr;
     const auto at = [&](int i, int j) {
-        if (r) return alphaOf(*texture, r->texel(i, j));
+        if (r) return alphaOf(*r, r->texel(i, j));
         return set_.objectOutside(view.number, i, j) ? 255.0f : 0.0f;
     };
     return between(at(ix, iy), at(ix + 1, iy), at(ix, iy + 1), at(ix + 1, iy + 1));
 }
 
-Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
+Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)), glass_(set_) {
     std::vector<View> all(set_.views().size());
     parallelFor(0, all.size(), [&](std::size_t n) {
         set_.settle();
@@ -145,7 +154,7 @@ Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
         if (set_.views()[number].unread) return;
         const Camera& camera = set_.views()[number].camera;
         const int w = camera.width, h = camera.height;
-        Image<std::uint8_t> alpha = alphaOf(set_, number);
+        Image<std::uint8_t> alpha = alphaOf(number);
         if (std::all_of(alpha.data(), alpha.data() + alpha.count(),
                         [](std::uint8_t a) { return a == 255; }))
             return;
@@ -161,7 +170,15 @@ Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
     }
     const bool unread = std::ranges::any_of(
         set_.views(), [](const PageView& v) { return v.unread && v.unread->open; });
-    if (!views_.empty() || unread) outlines_.emplace(set_);
+    if (!views_.empty() || unread) outlines_.emplace(set_, &glass_);
+    if (!outlines_ || glass_.none()) return;
+    for (std::size_t n = 0; n < set_.views().size(); ++n) {
+        const auto hasGlass = [&](const PageRectangle& r) {
+            return !glass_.none(static_cast<std::size_t>(r.page));
+        };
+        if (std::ranges::any_of(set_.rectanglesOf(n), hasGlass))
+            glassViews_.push_back({n, set_.views()[n].camera});
+    }
 }
 
 /// Which of the `wanted` samples of a pixel, a bit for each, are free at that depth. Asks view
@@ -208,6 +225,30 @@ std::uint32_t Silhouettes::freeSamples(const Maps& maps, int x, int y, double de
         }
     }
     return free;
+}
+
+bool Silhouettes::nearGlass(const Maps& maps, int x, int y, double depth) const {
+    for (std::size_t k = 0; k < glassViews_.size(); ++k) {
+        const auto& [number, camera] = glassViews_[k];
+        const PixelMap& m = maps[k];
+        const glm::dvec3 h = (m.a0 + m.au * double(x) + m.av * double(y)) * depth + m.b0 +
+                             m.bu * double(x) + m.bv * double(y);
+        if (!(h.z > 0)) continue;
+        const double w = camera.orthographic ? 1.0 : 1.0 / h.z;
+        const glm::dvec2 at(h.x * w + 0.5, h.y * w + 0.5);
+        if (!(at.x >= 0 && at.y >= 0 && at.x < camera.width && at.y < camera.height)) continue;
+        // What sticks out of glass lies beside it.
+        for (const int down : {0, -kReach, kReach}) {
+            for (const int across : {0, -kReach, kReach}) {
+                const int i = static_cast<int>(at.x) + across, j = static_cast<int>(at.y) + down;
+                if (i < 0 || j < 0 || i >= camera.width || j >= camera.height) continue;
+                const PageRectangle* r = set_.find(number, i, j);
+                if (r && glass_.coverage(static_cast<std::size_t>(r->page), r->texel(i, j)) > 0)
+                    return true;
+            }
+        }
+    }
+    return false;
 }
 
 float Silhouettes::coverage(const Camera& camera, const Maps& maps, int x, int y,
@@ -287,6 +328,24 @@ void Silhouettes::carve(Frame& frame, const Camera& camera, const Extent& drawn)
                     covered_.at(x, y) = coverage(camera, maps, x, y, frame.depth, seesPast);
                 });
     });
+    if (!glassViews_.empty()) {
+        Maps glassMaps;
+        for (const GlassView& view : glassViews_)
+            glassMaps.push_back(pixelMap(camera, view.camera));
+        // Before any pixel is changed: what is around one is looked at.
+        inRows([&](int from, int to) {
+            for (int y = from; y < to; ++y)
+                forWhere(
+                    partOf(y), [](float c) { return c >= 0.0f; },
+                    [&](int column) {
+                        const int x = part.x0 + column;
+                        if (!nearGlass(glassMaps, x, y, frame.depth.at(x, y))) return;
+                        float& share = covered_.at(x, y);
+                        // Something opaque around it does not make glass opaque.
+                        share = std::min(share * alphaAround(frame, x, y), frame.colour.at(x, y).a);
+                    });
+        });
+    }
     inRows([&](int from, int to) {
         for (int y = from; y < to; ++y)
             forWhere(

@@ -33,6 +33,7 @@ struct BlockTask {
     bool small = true;           ///< every splat closes its gaps within 2x2 pixels
     bool uniform = true;         ///< small, and all share a tilt and go on in colour
     bool opaque = true;
+    bool glass = false;  ///< some of its points are glass; else kLinked is all that Slope::u has
     float slopeX = 0,
           slopeY = 0;         ///< relative change of novel depth per output pixel; 0 if not smooth
     float core2 = 0.5f;       ///< squared radius in which a splat hides what is behind, if small

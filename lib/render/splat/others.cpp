@@ -58,10 +58,14 @@ Samples samplesOf(const PageRectangle& r, const Page& page, const Pixels<Slope>&
     const auto isDrawn = [&](std::size_t texel) {
         return hasPoint(page.depth->data()[texel]) && (b.opaque || page.texture->alpha(texel) > 0);
     };
+    const auto isOpaque = [&](std::size_t texel) {
+        return !b.glass || page.texture->alpha(texel) >= 1.0f;
+    };
     for (int y = y0; y < y1; ++y)
         for (int x = x0; x < x1; ++x)
-            out.edges = out.edges || !(hasPoint(page.depth->data()[texelOf(x, y)]) &&
-                                       slopes[texelOf(x, y)].u & Slope::kLinked);
+            out.edges =
+                out.edges || !(hasPoint(page.depth->data()[texelOf(x, y)]) &&
+                               slopes[texelOf(x, y)].u & Slope::kLinked && isOpaque(texelOf(x, y)));
     for (int y = y0; y < y1; y += 2) {
         for (int x = x0; x < x1; x += 2) {
             // The first of four that is drawn, another one first each time.
@@ -137,6 +141,7 @@ class Lookup {
         const float* depth;
         const Slope* slope;
         float dist, spacing;  ///< of the point that is looked up
+        bool opaque;          ///< not looked at where there is no glass: no other has kLinked
     };
     [[nodiscard]] bool find(int x, int y, Place& place) const {
         if (set_.views()[view_].unread) return false;
@@ -147,10 +152,11 @@ class Lookup {
         const std::size_t texel = r->texel(x, y);
         place.depth = set_.pages()[page].depth->data() + texel;
         place.slope = prepared_.pages[page].slopes.data() + texel;
+        place.opaque = !prepared_.glass || set_.pages()[page].texture->alpha(texel) >= 1.0f;
         return true;
     }
     [[nodiscard]] static bool isSurface(const Place& p) {
-        if (!hasPoint(*p.depth) || !(p.slope->u & Slope::kLinked)) return false;
+        if (!hasPoint(*p.depth) || !(p.slope->u & Slope::kLinked) || !p.opaque) return false;
         const auto steepness =
             static_cast<float>(std::abs(int{p.slope->u}) + std::abs(int{p.slope->v})) / kSlopeScale;
         if (steepness > kSteepestShown) return false;

@@ -1,6 +1,7 @@
 #include "lib/render/splat/plan.hpp"
 
 #include <cmath>
+#include <limits>
 
 #include "lib/render/splat/constants.hpp"
 #include "lib/render/splat/others.hpp"
@@ -195,6 +196,7 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
     task.u1 = block.u1;
     task.v1 = block.v1;
     task.opaque = block.opaque;
+    task.glass = block.glass;
     const Corners corners = cornersOf(block, s.map, novel.orthographic);
     if (!(corners.zMax > 0)) return false;
     const bool crossing = !(corners.zMin > kCrossing * corners.zMax);
@@ -234,6 +236,12 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
     task.nearest = 0.999f * least * task.zMin / (1.0f + task.tolerance);
 
     return setReach(corners, crossing, cover2, novel, task);
+}
+
+float largestSplat(const Camera& novel) {
+    if (novel.orthographic) return std::numeric_limits<float>::max();
+    return std::max(kLargest,
+                    kLargestShare * static_cast<float>(std::max(novel.width, novel.height)));
 }
 
 }  // namespace stx::splat

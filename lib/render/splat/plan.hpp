@@ -11,4 +11,8 @@ namespace stx::splat {
                              const RectangleImages& source, const Camera& novel,
                              const ShareLength& shares, bool cullBackFaces, BlockTask& task);
 
+/// How far splats of a picture reach from their points at most, pixels (kLargest, kLargestShare).
+/// Orthographic pictures show a plane as it is, however close it is: no end.
+[[nodiscard]] float largestSplat(const Camera& novel);
+
 }  // namespace stx::splat

@@ -5,6 +5,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/base/rounding.hpp"
+#include "lib/render/scene/glass_pages.hpp"
 
 namespace stx::splat {
 namespace {
@@ -240,8 +241,9 @@ bool usable(glm::vec3 v) {
     return glm::dot(v, v) > 0.0f;
 }
 
-void prepareRow(const Window& w, const glm::mat3& cameraFromWorld, int y, NormalRow* normals,
-                PreparedPage& out) {
+/// `glass`: glassCoverage() of the page.
+void prepareRow(const Window& w, const Image<std::uint8_t>& glass, const glm::mat3& cameraFromWorld,
+                int y, NormalRow* normals, PreparedPage& out) {
     const Camera& camera = w.camera();
     for (int x = 0; x < camera.width; ++x) {
         const std::size_t i = w.texel(x, y);
@@ -282,7 +284,9 @@ void prepareRow(const Window& w, const glm::mat3& cameraFromWorld, int y, Normal
         const auto flagged = [](std::int16_t code, bool flag) {
             return static_cast<std::int16_t>((code & ~1) | (flag ? 1 : 0));
         };
-        out.slopes[i] = {flagged(coded(slope.x), around.linked),
+        // As with alpha elsewhere (kHides), half of a pixel is enough to hide what is behind.
+        const bool isGlass = !glass.empty() && glass.data()[i] >= kHalfGlass;
+        out.slopes[i] = {flagged(coded(slope.x), around.linked || isGlass),
                          flagged(coded(slope.y), around.rim)};
         if (normals) {
             normals->slopeX[x] = slope.x;
@@ -331,7 +335,8 @@ std::vector<BlockInfo> blocksOfRow(const Window& w, const PreparedPage& page, in
                 b.slopeMin = {std::min(b.slopeMin.u, s.u), std::min(b.slopeMin.v, s.v)};
                 b.slopeMax = {std::max(b.slopeMax.u, s.u), std::max(b.slopeMax.v, s.v)};
                 if (!page.sizes.empty()) b.size = std::max(b.size, page.sizes[i] / 64.0f);
-                b.linked = b.linked && (s.u & Slope::kLinked);
+                b.linked = b.linked && alpha >= 1.0f && (s.u & Slope::kLinked);
+                b.glass = b.glass || (alpha < 1.0f && (s.u & Slope::kGlass));
             }
         }
         if (b.zMin < kNoDepth) out.push_back(b);
@@ -362,7 +367,8 @@ PreparedPages preparePages(const PageSet& set, bool wantNormals) {
     };
     // The rectangles of a page follow each other. It goes into the spool when they are done: what
     // is written there bit by bit takes longer.
-    std::optional<std::size_t> inMemory;
+    std::optional<std::size_t> inMemory, glassOf;
+    Image<std::uint8_t> glass;  // of page glassOf
     const auto moveOut = [&] {
         if (!inMemory || !set.spool()) return;
         PreparedPage& page = out.pages[*inMemory];
@@ -385,14 +391,18 @@ PreparedPages preparePages(const PageSet& set, bool wantNormals) {
             makeRoom(number, nullptr);
             inMemory = number;
         }
+        if (glassOf != number) {
+            glass = glassCoverage(*w.page.texture, *w.page.depth);
+            glassOf = number;
+        }
         const glm::mat3 cameraFromWorld(
             glm::mat3_cast(glm::conjugate(rectangle.window.orientation)));
         parallelForBlocks(0, rectangle.height, 16, [&](std::int64_t from, std::int64_t to) {
             std::optional<NormalRow> normals;
             if (!page.normals.empty()) normals.emplace(w.camera());
             for (auto y = from; y < to; ++y)
-                prepareRow(w, cameraFromWorld, static_cast<int>(y), normals ? &*normals : nullptr,
-                           page);
+                prepareRow(w, glass, cameraFromWorld, static_cast<int>(y),
+                           normals ? &*normals : nullptr, page);
         });
         const int rows = (rectangle.height + kBlock - 1) / kBlock;
         std::vector<std::vector<BlockInfo>> perRow(static_cast<std::size_t>(rows));
@@ -402,6 +412,7 @@ PreparedPages preparePages(const PageSet& set, bool wantNormals) {
         PreparedRectangle& prepared = out.rectangles.emplace_back();
         prepared.rectangle = &rectangle;
         for (auto& r : perRow) prepared.blocks.insert(prepared.blocks.end(), r.begin(), r.end());
+        for (const BlockInfo& b : prepared.blocks) out.glass = out.glass || b.glass;
     }
     moveOut();
     for (std::size_t i = 0; i < out.pages.size(); ++i)

@@ -18,9 +18,11 @@ inline constexpr int kBlock = 16;
 struct Slope {
     std::int16_t u = 0, v = 0;
 
-    /// The lowest bit of u: all four neighbours are opaque points of the same surface. The lowest
-    /// bit of v: the surface ends here, a neighbour lies behind or is empty.
-    static constexpr int kLinked = 1, kRim = 1;
+    /// The lowest bit of u: of an opaque point, all four neighbours are opaque points of the same
+    /// surface; of another, it is glass, which half of the pixel shows or more (glassCoverage()),
+    /// and hides what is behind it whatever its alpha is. The lowest bit of v: the surface ends
+    /// here, a neighbour lies behind or is empty.
+    static constexpr int kLinked = 1, kGlass = 1, kRim = 1;
 };
 inline constexpr float kSlopeScale = 2048.0f;
 
@@ -32,6 +34,7 @@ struct BlockInfo {
     float size = 1;      ///< largest size of its splats, relative to what closes the lattice
     bool linked = true;  ///< all its points are linked
     bool opaque = true;  ///< all its points have full alpha
+    bool glass = false;  ///< some of its points are glass
     /// Of each quarter (upper left, upper right, lower left, lower right), a bit for each view of
     /// PreparedRectangle::others that shows all its points, too. Of findOthers().
     std::array<std::uint16_t, 4> shownBy{};
@@ -81,7 +84,8 @@ struct PreparedRectangle {
 struct PreparedPages {
     std::vector<PreparedPage> pages;
     std::vector<PreparedRectangle> rectangles;
-    double radius = 0;  ///< of the scene, scene units
+    double radius = 0;   ///< of the scene, scene units
+    bool glass = false;  ///< some block has glass
 };
 
 /// Tilts from splatU x splatV, else the normals, else the neighbours' depths (never over a depth

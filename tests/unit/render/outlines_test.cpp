@@ -125,6 +125,24 @@ TEST_P(OutlinesOf, RunWhereTheOutermostPointsAre) {
 
 INSTANTIATE_TEST_SUITE_P(Views, OutlinesOf, testing::Values(12, 40));
 
+/// Points of glass have an alpha below one half, which says nothing of outlines.
+TEST(Outlines, OfGlassRunWhereItsPointsAre) {
+    Bundle bundle = ballFromAround();
+    const Camera camera = novelCamera(64);
+    const Frame frame = fatBall(camera);
+    Image<float> opaque = allAsked(frame), glass = opaque, faint = opaque;
+    Outlines(bundle).measure(frame, camera, opaque);
+    for (ReferenceView& view : bundle.views)
+        for (auto& p : view.texture.rgba8()->pixels()) p.a = p.a == 255 ? 77 : 0;
+    const GlassPages pages(bundle);
+    EXPECT_FALSE(pages.none());
+    Outlines(bundle, &pages).measure(frame, camera, glass);
+    EXPECT_TRUE(glass == opaque);
+    const Image<float> asked = faint;
+    Outlines(bundle).measure(frame, camera, faint);
+    EXPECT_TRUE(faint == asked);
+}
+
 TEST(Outlines, AskNoViewThatLooksElsewhere) {
     Bundle bundle = ballFromAround();
     const Camera camera = novelCamera(64);

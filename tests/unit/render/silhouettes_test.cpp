@@ -107,6 +107,59 @@ TEST(Silhouettes, FullScenesAreLeftAlone) {
     EXPECT_TRUE(before == frame.colour);
 }
 
+/// The disc from behind, where a pane of glass that fills the picture is before it.
+ReferenceView paneBeforeTheDisc() {
+    ReferenceView view;
+    view.camera =
+        Camera::fromFieldOfView({0, 0, -3}, {0, 0, 1, 0}, {0.5, 0.5}, false, kSize, kSize);
+    view.texture = Texture(Rgba8Image(kSize, kSize, glm::u8vec4(90, 90, 90, 77)));
+    view.depth = Image<float>(kSize, kSize, 1.0f);
+    view.nearPlane = 0.9;
+    view.farPlane = 1.1;
+    return view;
+}
+
+/// The alpha of glass, 0.3, was taken for that of an outline that rays pass by.
+TEST(Silhouettes, NoRayPassesByInsideOfGlass) {
+    auto bundle = discBundle();
+    const auto camera = bundle.views[0].camera;
+    auto alone = fatFrame(camera), behindGlass = fatFrame(camera);
+    Silhouettes(bundle).carve(alone, camera);
+    bundle.views.push_back(paneBeforeTheDisc());
+    ASSERT_GT(bundle.views[1].camera.forward().z, 0.99);
+    Silhouettes(bundle).carve(behindGlass, camera);
+    EXPECT_FALSE(alone.colour == fatFrame(camera).colour);
+    EXPECT_TRUE(behindGlass.colour == alone.colour && behindGlass.depth == alone.depth);
+}
+
+/// A rim of glass was given its coverage as alpha: opaque, and bright.
+TEST(Silhouettes, GlassKeepsItsAlphaAtItsOutline) {
+    for (const int percent : {30, 60}) {
+        const float own = static_cast<float>(percent) / 100.0f;
+        auto bundle = discBundle();
+        const auto& camera = bundle.views[0].camera;
+        double truth = 0;
+        for (auto& p : bundle.views[0].texture.rgba8()->pixels()) {
+            truth += own * p.w / 255.0;
+            p.w = static_cast<std::uint8_t>(p.w * percent / 100);
+        }
+        auto frame = fatFrame(camera);
+        for (auto& c : frame.colour.pixels()) c *= own;
+        Silhouettes(bundle).carve(frame, camera);
+        double sum = 0;
+        float most = 0;
+        for (const auto& c : frame.colour.pixels()) {
+            sum += c.w;
+            most = std::max(most, c.w);
+            if (c.w > 0) {
+                EXPECT_NEAR(c.x / c.w, 0.8f, 1e-4f) << "straight colour stays";
+            }
+        }
+        EXPECT_NEAR(most, own, 1e-5f) << percent;
+        EXPECT_NEAR(sum / truth, 1.0, 0.05) << percent;
+    }
+}
+
 TEST(Silhouettes, TheSameOnAnyNumberOfThreads) {
     const auto bundle = discBundle();
     Image<glm::vec4> first;

@@ -84,6 +84,32 @@ TEST_P(GpuSplat, AgreesWithTheCpu) {
     }
 }
 
+/// Float colours whose alpha is `alpha` where the object is.
+Bundle glassObject(float alpha) {
+    Bundle bundle = analyticBundle(AnalyticScene::object, 5);
+    for (auto& view : bundle.views) {
+        RgbaFloatImage light(view.camera.width, view.camera.height);
+        for (std::size_t i = 0; i < light.count(); ++i) {
+            const glm::vec4 c = view.texture.at(i);
+            light.data()[i] = {glm::vec3(c), c.a * alpha};
+        }
+        view.texture = Texture(std::move(light));
+    }
+    return bundle;
+}
+
+/// An alpha of exactly one half hid what is behind on the processor and not on a GPU. Below that
+/// glass had no depth on either.
+TEST_P(GpuSplat, AgreesWithTheCpuOnGlass) {
+    const Camera camera = analyticCamera(AnalyticScene::object, 0.4, 5);
+    for (const float alpha : {0.5f, 0.3f}) {
+        const Bundle bundle = glassObject(alpha);
+        test::expectAgreement(draw(bundle, splatSettings(), camera),
+                              drawOnCpu(bundle, splatSettings(), camera),
+                              fmt::format("alpha {}", alpha));
+    }
+}
+
 /// Where what blends with the front is held to the scene.
 TEST_P(GpuSplat, AgreesWithTheCpuFromFarAway) {
     const Bundle bundle = analyticBundle(AnalyticScene::object, 5, 2);
@@ -98,6 +124,19 @@ TEST_P(GpuSplat, AgreesWithTheCpuFromFarAway) {
         test::expectAgreement(frame, drawOnCpu(bundle, splatSettings(), camera),
                               orthographic ? "orthographic" : "perspective");
     }
+}
+
+/// A thousandth of a unit of a wall, whose samples lie hundreds of pixels and more apart.
+TEST_P(GpuSplat, FillsOrthographicCloseUps) {
+    const Bundle bundle = test::smallRoom(1, 128);
+    Camera camera = bundle.views[0].camera.resized(160, 120);
+    camera.orthographic = true;
+    camera.fx = camera.fy = 160 / 0.001;
+    camera.cx = 80;
+    camera.cy = 60;
+    const auto frame = draw(bundle, splatSettings(), camera);
+    test::expectAgreement(frame, drawOnCpu(bundle, splatSettings(), camera), "close-up");
+    for (const float d : frame->depth.pixels()) ASSERT_TRUE(hasPoint(d));
 }
 
 TEST_P(GpuSplat, DrawsFramesLargerThanOnePiece) {

@@ -95,6 +95,8 @@ Drawn drawScalar(const Inputs& in) {
             p.view = in.viewEntry();
             p.source = in.depth[k];
             p.flatFrame = in.novel.orthographic;
+            p.opaque = true;
+            p.largest = kLargest;
             const int u = i % kBlock, v = i / kBlock;
             if (!hasPoint(p.source) ||
                 !shape.placePoint(p, static_cast<float>(u), static_cast<float>(v)))
@@ -194,7 +196,7 @@ Drawn drawOnDevice(const Inputs& in, test::Device& device) {
     frame.counts = {1, 1, 0, 0};
     frame.novelAxisX.w = in.novel.orthographic ? 1.0f : 0.0f;
     frame.novelPosition.w = in.coefficient;
-    frame.scales = {65536, 255, 0, 0};
+    frame.scales = {65536, 255, kLargest, 0};
     device.uniforms(0, frame);
     device.storage(0, std::vector{in.viewEntry()});
     device.storage(1, std::vector{Inputs::taskEntry()});

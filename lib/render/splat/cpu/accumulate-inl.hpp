@@ -77,9 +77,8 @@ HWY_INLINE Projection project(DF d, const RowMap& m, int i, VF z, const Region& 
     return out;
 }
 
-// Which of the lanes have alpha above a threshold of 0..255.
-HWY_INLINE hn::Mask<DF> alphaAbove(DF d, const RectangleImages& s, std::size_t pixel, int count,
-                                   int threshold) {
+// Alpha of up to a vector of pixels, 0..255.
+HWY_INLINE VF alphaOf(DF d, const RectangleImages& s, std::size_t pixel, int count) {
     HWY_ALIGN float alpha[kBlock];
     const int lanes = static_cast<int>(hn::Lanes(d));
     for (int i = 0; i < lanes; ++i) {
@@ -90,7 +89,12 @@ HWY_INLINE hn::Mask<DF> alphaAbove(DF d, const RectangleImages& s, std::size_t p
         else
             alpha[i] = s.rgbaFloat[4 * (pixel + i) + 3] * 255.0f;
     }
-    return hn::Gt(hn::Load(d, alpha), hn::Set(d, static_cast<float>(threshold)));
+    return hn::Load(d, alpha);
+}
+
+// Whether a point of such an alpha hides what is behind it.
+HWY_INLINE hn::Mask<DF> hides(DF d, VF alpha) {
+    return hn::Ge(alpha, hn::Set(d, 255.0f * kHides));
 }
 
 }  // namespace stx::splat::HWY_NAMESPACE

@@ -207,8 +207,11 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
         if (picture.shape.coefficient > 0) {
             // Round splats may be larger than the plan, which follows the data.
             const double z = std::max(1e-9f, task.zMin);
-            const int radius = static_cast<int>(
-                std::min(300.0, 1 + picture.shape.coefficient / (camera.orthographic ? 1.0 : z)));
+            const double radiusThere =
+                1 + picture.shape.coefficient / (camera.orthographic ? 1.0 : z);
+            // From any pixel the sides of the picture are nearer than both together.
+            const int radius = static_cast<int>(std::min(
+                {radiusThere, 1.0 + largestSplat(camera), double(camera.width + camera.height)}));
             x0 = std::max(0, x0 - radius);
             x1 = std::min(camera.width - 1, x1 + radius);
             y0 = std::max(0, y0 - radius);
@@ -273,6 +276,7 @@ void CpuSplatRenderer::drawRegion(Picture& picture, int index) {
     region.rows = std::min(kRegionRows, camera.height - region.top);
     region.stride = region.width + 2;
     region.orthographic = camera.orthographic;
+    region.largest = largestSplat(camera);
     const auto& bin = bins_[index];
     if (bin.empty()) {
         for (int y = region.top; y < region.top + region.rows; ++y) {
@@ -364,7 +368,7 @@ void CpuSplatRenderer::resolveBlended(Picture& picture, const Region& region) co
             }
             if (!opaque_ && !hasPoint(depth)) {
                 // Only faint splats of a silhouette reach here, or only the skirts of full ones.
-                if (!(colour.a < 0.5f)) colour = glm::vec4(0.0f);
+                if (!(colour.a < kHides)) colour = glm::vec4(0.0f);
                 if (colour.a > 0)
                     for (const int step : {-1, 1, -region.stride, region.stride})
                         depth = std::min(depth, region.depth[i + step]);

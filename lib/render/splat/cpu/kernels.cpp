@@ -121,7 +121,8 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
             const int count = t.u1 - t.u0 - i;
             Splats p = splatsOf<kUniform, false>(d, s, t, map, v - t.v0, i, pixel, count, region);
             if (!t.opaque) {
-                const auto solid = alphaAbove(d, s, pixel, count, 127);
+                auto solid = hides(d, alphaOf(d, s, pixel, count));
+                if (t.glass) solid = hn::Or(solid, glassOf(d, s, pixel, count));
                 p.small = hn::And(p.small, solid);
                 p.large = hn::And(p.large, solid);
             }
@@ -285,7 +286,7 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
             const int count = t.u1 - t.u0 - i;
             Splats p = splatsOf<kUniform, true>(d, s, t, map, v - t.v0, i, pixel, count, region);
             if (!kOpaque) {
-                const auto any = alphaAbove(d, s, pixel, count, 0);
+                const auto any = hn::Gt(alphaOf(d, s, pixel, count), hn::Zero(d));
                 p.small = hn::And(p.small, any);
                 p.large = hn::And(p.large, any);
             }
@@ -330,17 +331,21 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
 
 // --- SplatRule::paper ------------------------------------------------------------------------
 
-// Calls draw(pixel, splat) for each point of a block as a round splat.
-template <class F>
+// Calls draw(pixel, splat) for each point of a block as a round splat; kHiding: for those that hide
+// what is behind.
+template <bool kHiding, class F>
 HWY_INLINE void forRound(const RectangleImages& s, const BlockTask& t, const Shape& shape,
-                         const Region& region, int alphaThreshold, const F& draw) {
+                         const Region& region, const F& draw) {
     for (int v = t.v0; v < t.v1; ++v) {
         const RowMap map(s.map, t.u0, v);
         for (int u = t.u0; u < t.u1; ++u) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + u;
             const float alpha =
                 s.rgba8 ? s.rgba8[4 * pixel + 3] : s.rgbaFloat[4 * pixel + 3] * 255.0f;
-            if (!(s.depth[pixel] < kInfinity) || !(alpha > alphaThreshold)) continue;
+            if (!(s.depth[pixel] < kInfinity)) continue;
+            const bool solid =
+                alpha >= 255.0f * kHides || (t.glass && s.slopes[pixel].u & Slope::kGlass);
+            if (kHiding ? !solid : !(alpha > 0.0f)) continue;
             float h[3];
             for (int k = 0; k < 3; ++k) {
                 const float i = static_cast<float>(u - t.u0);
@@ -349,7 +354,7 @@ HWY_INLINE void forRound(const RectangleImages& s, const BlockTask& t, const Sha
             if (!(h[2] > kNearest)) continue;
             const float inverse = region.orthographic ? 1.0f : 1.0f / h[2];
             const float radius =
-                std::min(std::max(0.5f, 0.5f * shape.coefficient * inverse), kLargest);
+                std::min(std::max(0.5f, 0.5f * shape.coefficient * inverse), region.largest);
             const float q = kReach2 / (radius * radius);
             const float x = h[0] * inverse, y = h[1] * inverse;
             const DF d;
@@ -378,7 +383,8 @@ void pointsImpl(const RectangleImages& s, const BlockTask& t, const Region& regi
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
             Projection p = project(d, map, i, loadDepth(d, s.depth + pixel, count), region);
-            if (!t.opaque) p.inside = hn::And(p.inside, alphaAbove(d, s, pixel, count, 0));
+            if (!t.opaque)
+                p.inside = hn::And(p.inside, hn::Gt(alphaOf(d, s, pixel, count), hn::Zero(d)));
             std::uint32_t bits = bitsOf(d, p.inside);
             if (!bits) continue;
             // The nearest of the four pixels.
@@ -405,8 +411,8 @@ void depthImpl(const RectangleImages& s, const BlockTask& t, const Ahead& ahead,
                const Region& region) {
     const DF d;
     if (shape.coefficient > 0) {
-        forRound(s, t, shape, region, 127,
-                 [&](std::size_t, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, region); });
+        forRound<true>(s, t, shape, region,
+                       [&](std::size_t, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, region); });
     } else if (t.uniform) {
         depthBlock<true>(s, t, ahead, region);
     } else {
@@ -431,7 +437,7 @@ void colourImpl(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
                 const Shape& shape, const Region& region) {
     const DF d;
     if (shape.coefficient > 0) {
-        forRound(s, t, shape, region, 0, [&](std::size_t pixel, const Ellipse& e) HWY_ATTR {
+        forRound<false>(s, t, shape, region, [&](std::size_t pixel, const Ellipse& e) HWY_ATTR {
             const PointColour point = pointColourOf(s, pixel, t.opaque);
             if (s.normals)
                 colourEllipse<false, true>(d, e, point, t.tolerance, region);

@@ -29,6 +29,7 @@ struct Region {
     int width = 0, rows = 0;    ///< pixels
     int stride = 0;             ///< width + 2
     bool orthographic = false;  ///< the novel camera
+    float largest = kLargest;   ///< largestSplat() of the picture
     float* depth = nullptr;     ///< nearest novel depth; infinity = nothing
     float* colour = nullptr;   ///< four a pixel: weighted sums of R, G, B times alpha, and of alpha
     float* missing = nullptr;  ///< weighted sum of 1 - alpha

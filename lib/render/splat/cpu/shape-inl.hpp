@@ -30,20 +30,29 @@ struct Splats {
     VF uAcross, vAcross, uDown, vDown;
 };
 
+// Slopes and their flags of up to a vector of pixels, u in the lower half of each lane.
+HWY_INLINE VI packedSlopes(const RectangleImages& s, std::size_t pixel, int count) {
+    const DI di;
+    static_assert(sizeof(Slope) == 4 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
+    if (count >= static_cast<int>(hn::Lanes(di)))
+        return hn::LoadU(di, reinterpret_cast<const std::int32_t*>(s.slopes + pixel));
+    HWY_ALIGN std::int32_t padded[kBlock] = {};
+    std::memcpy(padded, s.slopes + pixel, static_cast<std::size_t>(count) * sizeof(Slope));
+    return hn::Load(di, padded);
+}
+
+// Which of the pixels of a block with glass are glass, or opaque.
+HWY_INLINE hn::Mask<DF> glassOf(DF d, const RectangleImages& s, std::size_t pixel, int count) {
+    const VI packed = packedSlopes(s, pixel, count);
+    return hn::RebindMask(d, hn::TestBit(packed, hn::Set(DI(), Slope::kGlass)));
+}
+
 // Slopes, sizes and links of up to a vector of pixels.
 HWY_INLINE void loadShape(DF d, const RectangleImages& s, std::size_t pixel, int count, VF& u,
                           VF& v, VF& size, hn::Mask<DF>& linked, hn::Mask<DF>& rim) {
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
-    static_assert(sizeof(Slope) == 4 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
-    VI packed;
-    if (count >= lanes) {
-        packed = hn::LoadU(di, reinterpret_cast<const std::int32_t*>(s.slopes + pixel));
-    } else {
-        HWY_ALIGN std::int32_t padded[kBlock] = {};
-        std::memcpy(padded, s.slopes + pixel, static_cast<std::size_t>(count) * sizeof(Slope));
-        packed = hn::Load(di, padded);
-    }
+    const VI packed = packedSlopes(s, pixel, count);
     u = hn::ConvertTo(d, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed)));
     v = hn::ConvertTo(d, hn::ShiftRight<16>(packed));
     linked = hn::RebindMask(d, hn::TestBit(packed, hn::Set(di, Slope::kLinked)));
@@ -122,18 +131,25 @@ HWY_INLINE void setColour(DF d, const BlockTask& t, hn::Mask<DF> linked, hn::Mas
 
 // The ellipses of large splats: the lattice's Gaussian carried into the picture, and the low-pass
 // filter added. `reach`: where they end, squared deviations.
-HWY_INLINE void setEllipses(DF d, VF size, const Jacobian& by, float reach, Splats& out) {
+HWY_INLINE void setEllipses(DF d, VF size, const Jacobian& by, VF det, float reach,
+                            const Region& region, Splats& out) {
     const auto square = [](VF x, VF y) HWY_ATTR { return hn::MulAdd(x, x, hn::Mul(y, y)); };
     const VF k = hn::Mul(hn::Mul(size, size), hn::Set(d, kSigmaSource * kSigmaSource));
     const VF low = hn::Set(d, kSigmaPixel * kSigmaPixel);
     const VF vxx = hn::MulAdd(k, square(by.xu, by.xv), low);
     const VF vyy = hn::MulAdd(k, square(by.yu, by.yv), low);
     const VF vxy = hn::Mul(k, hn::MulAdd(by.xu, by.yu, hn::Mul(by.xv, by.yv)));
-    const VF scale = hn::Div(hn::Set(d, 1.0f), hn::NegMulAdd(vxy, vxy, hn::Mul(vxx, vyy)));
+    VF determinant = hn::NegMulAdd(vxy, vxy, hn::Mul(vxx, vyy));
+    // Without cancellation where splats may be so large that nothing would be left of it.
+    if (region.orthographic) {
+        const VF area = hn::Mul(k, det);
+        determinant = hn::MulAdd(area, area, hn::Mul(low, hn::Sub(hn::Add(vxx, vyy), low)));
+    }
+    const VF scale = hn::Div(hn::Set(d, 1.0f), determinant);
     out.qxx = hn::Mul(vyy, scale);
     out.qyy = hn::Mul(vxx, scale);
     out.qxy = hn::Neg(hn::Mul(vxy, scale));
-    const VF end = hn::Set(d, reach), largest = hn::Set(d, kLargest);
+    const VF end = hn::Set(d, reach), largest = hn::Set(d, region.largest);
     out.halfX = hn::Min(hn::Sqrt(hn::Mul(end, vxx)), largest);
     out.halfY = hn::Min(hn::Sqrt(hn::Mul(end, vyy)), largest);
 }
@@ -163,6 +179,9 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
     VF su, sv, size;
     hn::Mask<DF> linked, rim;
     loadShape(d, s, pixel, count, su, sv, size, linked, rim);
+    // Of what is not opaque the flag says that it is glass.
+    if (kColour && t.glass)
+        linked = hn::And(linked, hn::Ge(alphaOf(d, s, pixel, count), hn::Set(d, 255.0f)));
     const VF spacing = s.orthographic ? one : depth;
     const VF du = hn::Mul(su, hn::Mul(spacing, hn::Set(d, 1.0f / (kSlopeScale * s.fx))));
     const VF dv = hn::Mul(sv, hn::Mul(spacing, hn::Set(d, 1.0f / (kSlopeScale * s.fy))));
@@ -209,7 +228,7 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
     }
     if (!hn::AllFalse(d, out.large)) {
         // The first pass draws only the core of a splat, which hides what is behind.
-        setEllipses(d, size, {xu, yu, xv, yv}, kColour ? kDrawn2 : kCore2, out);
+        setEllipses(d, size, {xu, yu, xv, yv}, det, kColour ? kDrawn2 : kCore2, region, out);
     }
     return out;
 }

@@ -2,6 +2,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/model/srgb8.hpp"
+#include "lib/render/splat/constants.hpp"
 #include "lib/surface/depth_gradient.hpp"
 
 namespace stx::gl {
@@ -44,7 +45,7 @@ PointArrays makePointArrays(const PageSet& set, bool lit) {
                     const std::size_t texel = r.texel(x, y);
                     const float dist = page.depth->data()[texel];
                     if (!hasPoint(dist)) continue;
-                    if (!(page.texture->alpha(texel) > 0.5f)) continue;
+                    if (!(page.texture->alpha(texel) >= splat::kHides)) continue;
                     const glm::dvec3 p =
                         camera.position +
                         camera.orientation * camera.unproject(x + 0.5, y + 0.5, dist) - out.centre;

@@ -7,6 +7,7 @@
 #include "lib/render/outline/silhouettes.hpp"
 #include "lib/render/splat/gpu/gpu_scene.hpp"
 #include "lib/render/splat/pinholes.hpp"
+#include "lib/render/splat/plan.hpp"
 
 namespace stx::gpu {
 namespace {
@@ -60,7 +61,8 @@ class GpuSplatRenderer final : public Renderer {
         return camera.width <= most && camera.height <= most;
     }
     [[nodiscard]] Frame emptyFrame(const Camera& camera) const;
-    Result<Begun> begin(const Camera& camera, int slot);
+    /// `largest`: splat::largestSplat() of the whole picture, of which `camera` may be a part.
+    Result<Begun> begin(const Camera& camera, float largest, int slot);
     /// Begins the frame that is expected next, in a slot.
     void beginExpected(const std::optional<Camera>& next, int slot);
     /// Waits for a piece of the frame and copies it to where it belongs.
@@ -114,10 +116,10 @@ Frame GpuSplatRenderer::emptyFrame(const Camera& camera) const {
     return frame;
 }
 
-Result<Begun> GpuSplatRenderer::begin(const Camera& camera, int slot) {
+Result<Begun> GpuSplatRenderer::begin(const Camera& camera, float largest, int slot) {
     const auto start = Clock::now();
     SplatFrame frame = planSplatFrame(resources_->scene, settings_, camera, lightPose(camera),
-                                      resources_->pipeline->margin());
+                                      largest, resources_->pipeline->margin());
     STX_CHECK(resources_->pipeline->draw(frame, slot));
     return Begun{camera, slot, millisecondsSince(start)};
 }
@@ -125,7 +127,7 @@ Result<Begun> GpuSplatRenderer::begin(const Camera& camera, int slot) {
 void GpuSplatRenderer::beginExpected(const std::optional<Camera>& next, int slot) {
     if (!next || !checkSize(*next) || !inOnePiece(*next)) return;
     // What fails here fails again, with a message, when the frame is asked for.
-    if (auto begun = begin(*next, slot)) begun_ = std::move(*begun);
+    if (auto begun = begin(*next, splat::largestSplat(*next), slot)) begun_ = std::move(*begun);
 }
 
 Result<void> GpuSplatRenderer::finish(const Begun& begun, glm::ivec2 at, Frame& frame) {
@@ -152,13 +154,15 @@ Result<void> GpuSplatRenderer::renderWhole(const Camera& camera, const std::opti
                                            Frame& frame) {
     auto begun = std::exchange(begun_, std::nullopt);
     // A frame that nobody asks for is overwritten, in the order of the commands.
-    if (!begun || begun->camera != camera) STX_SET(begun, begin(camera, 0));
+    if (!begun || begun->camera != camera)
+        STX_SET(begun, begin(camera, splat::largestSplat(camera), 0));
     beginExpected(next, 1 - begun->slot);
     return finish(*begun, {0, 0}, frame);
 }
 
 Result<void> GpuSplatRenderer::renderPieces(const Camera& camera, Frame& frame) {
     begun_.reset();
+    const float largest = splat::largestSplat(camera);
     const int piece = resources_->pipeline->largestPiece();
     for (int y = 0; y < camera.height; y += piece) {
         for (int x = 0; x < camera.width; x += piece) {
@@ -167,7 +171,7 @@ Result<void> GpuSplatRenderer::renderPieces(const Camera& camera, Frame& frame) 
             part.height = std::min(piece, camera.height - y);
             part.cx -= x;
             part.cy -= y;
-            STX_TRY(const Begun begun, begin(part, 0));
+            STX_TRY(const Begun begun, begin(part, largest, 0));
             STX_CHECK(finish(begun, {x, y}, frame));
         }
     }

@@ -113,7 +113,7 @@ TaskEntry taskEntry(const splat::BlockTask& t, glm::ivec2 begin, glm::ivec2 end,
 }  // namespace
 
 SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
-                          const Camera& novel, const Camera& lights, int margin) {
+                          const Camera& novel, const Camera& lights, float largest, int margin) {
     SplatFrame frame;
     const ShareLength shares(novel, scene.radius);
     frame.uniforms = uniformsOf(scene, settings, novel, margin);
@@ -159,7 +159,7 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
     // the kernel's four pixels add.
     const double steps = 255.0;
     const double weight = std::clamp(2147483647.0 / (steps * 4.0 * crowd), 1.0, kLargestWeight);
-    frame.uniforms.scales = glm::vec4(std::floor(weight), steps / scene.maxColour, 0, 0);
+    frame.uniforms.scales = glm::vec4(std::floor(weight), steps / scene.maxColour, largest, 0);
 
     addLights(settings.lighting, lights, frame);
     return frame;

@@ -39,9 +39,11 @@ struct SplatFrame {
 };
 
 /// Culls the blocks (outside, facing away), chooses their kernels as the CPU renderer does, and
-/// works out the matrices. `lights`: the pose that lights move with; `margin` = pixels around the
-/// frame of the raster targets.
+/// works out the matrices. `lights`: the pose that lights move with; `largest`: how far splats
+/// reach at most, pixels (splat::largestSplat()); `margin` = pixels around the frame of the raster
+/// targets.
 [[nodiscard]] SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
-                                        const Camera& novel, const Camera& lights, int margin);
+                                        const Camera& novel, const Camera& lights, float largest,
+                                        int margin);
 
 }  // namespace stx::gpu
