@@ -8,6 +8,7 @@
 #include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/files/files.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/images/images.hpp"
@@ -114,8 +115,8 @@ Result<std::unique_ptr<ViewTable>> changedAsAsked(std::unique_ptr<ViewTable> tab
     const auto bits = o.mesh->depthBits;
     if (o.refining.steps != "auto")
         STX_SET(table,
-                o.refining.refined(std::move(table), imported, folderOf(target), program.job));
-    if (o.cube) STX_SET(table, cubeOf(std::move(table), folderOf(target), program.job));
+                o.refining.refined(std::move(table), imported, folderBeside(target), program.job));
+    if (o.cube) STX_SET(table, cubeOf(std::move(table), folderBeside(target), program.job));
     // Readers of image sets have said it for what they made.
     if (!bits || std::ranges::all_of(std::as_const(*table).about().views,
                                      [&](const auto& v) { return v.depthBits == *bits; }))

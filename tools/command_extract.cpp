@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/any/sequences.hpp"
+#include "formats/files/files.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/export.hpp"

@@ -6,6 +6,7 @@
 
 #include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
+#include "formats/files/files.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/stopwatch.hpp"
@@ -330,7 +331,7 @@ Result<PackTable> openObject(const PackOptions& o, const std::string& input,
                              PackSettings& settings, Job& job) {
     preloadCodecs(input);
     STX_TRY(frames, openSequence(input, openOptions(o), job));
-    STX_TRY(frames, refined(std::move(frames), o.refine, kPacking, folderOf(o.output)));
+    STX_TRY(frames, refined(std::move(frames), o.refine, kPacking, folderBeside(o.output)));
     const Timeline timeline = frames->timeline();
     std::size_t moment = 0;
     if (timeline.moves()) {
@@ -444,7 +445,7 @@ Result<int> packInput(const PackOptions& options, const Command& command, Progra
     // One atlas for each frame is made in two passes.
     const bool twice = frames->timeline().moves() && !o.time;
     STX_TRY(frames, (twice ? refinedOnce : refined)(std::move(frames), o.refine, kPacking,
-                                                    folderOf(o.output)));
+                                                    folderBeside(o.output)));
     const Timeline timeline = frames->timeline();
     const std::size_t count = timeline.count();
     const bool numbered = frameName(o.output, 0).has_value();

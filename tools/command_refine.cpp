@@ -6,6 +6,7 @@
 #include "formats/any/open.hpp"
 #include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
+#include "formats/files/files.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/stopwatch.hpp"
@@ -71,7 +72,7 @@ Result<std::unique_ptr<ViewTable>> refinedStill(std::unique_ptr<ViewTable> table
         return refining.refine(bundle, spool, own);
     };
     STX_TRY(table, refinedViews(std::move(table), refining.left(), refine, false,
-                                folderOf(o.output), job));
+                                folderBeside(o.output), job));
     if (done) STX_CHECK(noteDisagreement(*table, refining.left(), job));
     return table;
 }

@@ -6,6 +6,7 @@
 #include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/files/files.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"

@@ -6,6 +6,7 @@
 #include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/files/file_spool.hpp"
+#include "formats/files/files.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/viewer/surfaces_glb.hpp"
 #include "formats/viewer/viewer_page.hpp"
@@ -90,7 +91,7 @@ Result<Bundle> viewsOfModel(std::unique_ptr<ViewTable> table, const RefineSettin
     if (!fewer && !table->whole() && memoryOfAll(*table, takes) > limit &&
         memoryOfSpooledSurfaces(*table) <= limit) {
         STX_TRY(const bool needed, mayRefine(*table, settings, job));
-        STX_TRY(spool, FileSpool::create(folderOf(output), limit / kSpoolPart));
+        STX_TRY(spool, FileSpool::create(folderBeside(output), limit / kSpoolPart));
         STX_TRY(auto bundle, wholeBundle(*table, *spool, job));
         if (needed) STX_CHECK(refineViews(bundle, settings, *spool, job));
         return bundle;

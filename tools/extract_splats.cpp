@@ -34,7 +34,7 @@ Result<SplatCloud> splatsOfTable(const ViewTable& table, const std::string& outp
     std::unique_ptr<FileSpool> spool;
     const std::uint64_t spooled = memoryOfSpooledSplats(table, job.limits, settings.most);
     if (inMemory > limit && spooled <= limit) {
-        STX_TRY(spool, FileSpool::create(folderOf(output), limit / kSpoolPart));
+        STX_TRY(spool, FileSpool::create(folderBeside(output), limit / kSpoolPart));
     } else {
         std::uint64_t pixels = 0;
         for (std::size_t i = 0; i < table.count(); ++i) pixels += table.pixelsOf(i);

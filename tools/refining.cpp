@@ -9,8 +9,6 @@
 #include "formats/any/save.hpp"
 #include "formats/files/file_spool.hpp"
 #include "formats/files/files.hpp"
-#include "formats/files/stream_names.hpp"
-#include "formats/files/temporaries.hpp"
 #include "lib/refine/refine_needed.hpp"
 #include "tools/peak_of_views.hpp"
 
@@ -189,16 +187,12 @@ Result<std::unique_ptr<ViewTable>> refinedViews(std::unique_ptr<ViewTable> table
     return tableOf(std::move(bundle), std::move(spool), held);
 }
 
-std::filesystem::path folderBeside(const std::string& output) {
-    return output == "-" || isStream(output) ? folderOfTemporaries() : folderOf(output);
-}
-
 std::unique_ptr<Sequence> changedOnTheWay(
     std::unique_ptr<Sequence> frames, const std::filesystem::path& target,
     std::function<Result<void>(Bundle& frame, Job& job)> change) {
     const auto container = containerOf(target);
     if (frames->timeline().moves() && container && *container == FileKind::mpeg4)
-        return changedOnce(std::move(frames), std::move(change), folderOf(target));
+        return changedOnce(std::move(frames), std::move(change), folderBeside(target));
     return changed(std::move(frames), std::move(change));
 }
 

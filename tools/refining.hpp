@@ -53,10 +53,6 @@ using RefineBundle = std::function<Result<void>(Bundle& bundle, PixelSpool* spoo
     std::unique_ptr<ViewTable> table, const RefineSettings& settings, const RefineBundle& refine,
     bool looksFirst, const std::filesystem::path& folder, Job& job);
 
-/// The folder of an output, for what is kept beside memory; of standard output that of temporary
-/// files.
-[[nodiscard]] std::filesystem::path folderBeside(const std::string& output);
-
 /// Frames on their way into a target, each changed once: MPEG-4 films are written in two passes.
 [[nodiscard]] std::unique_ptr<Sequence> changedOnTheWay(
     std::unique_ptr<Sequence> frames, const std::filesystem::path& target,

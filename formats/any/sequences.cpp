@@ -8,6 +8,7 @@
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/files/file_stamp.hpp"
+#include "formats/files/files.hpp"
 #include "formats/files/named_files.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/files/numbered.hpp"
@@ -372,7 +373,7 @@ Result<void> saveSequence(Sequence& frames, const fs::path& target, const SaveOp
         STX_TRY(const auto table, frames.views(0, job));
         return saveViews(*table, target, options, job);
     }
-    STX_TRY(auto spool, mpeg4::PictureSpool::create(folderOf(target)));
+    STX_TRY(auto spool, mpeg4::PictureSpool::create(folderBeside(target)));
     STX_TRY(const auto document, mpeg4::sceneFromSequence(frames, mpeg4Scene(options), spool, job));
     return writeMpeg4(document, target, job, mpeg4Write(options));
 }

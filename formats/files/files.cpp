@@ -151,6 +151,11 @@ fs::path folderOf(const fs::path& path) {
     return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
 
+fs::path folderBeside(const fs::path& output) {
+    if (output == "-" || isStream(output)) return folderOfTemporaries();
+    return folderOf(throughLinks(output).value_or(output));
+}
+
 tl::unexpected<Error> notAFile(const fs::path& path) {
     return fail(ErrorCode::io,
                 "cannot read '{}': it is a device or a pipe, not a file; use - for standard "

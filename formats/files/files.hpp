@@ -110,6 +110,10 @@ class OutputFolder {
 /// The folder that a file lies in; "." for a bare name.
 [[nodiscard]] std::filesystem::path folderOf(const std::filesystem::path& path);
 
+/// The folder for files that are needed while an output is made: the one that the output is written
+/// in, through links; of a stream or "-" folderOfTemporaries().
+[[nodiscard]] std::filesystem::path folderBeside(const std::filesystem::path& output);
+
 /// The file that `name`, found inside a bundle, set or model in `folder`, stands for. Errors
 /// (invalidInput) when it is absolute, has a URL scheme, leaves the folder by `..` or a link, or is
 /// not a regular file, unless limits.allowOutside; (io) when it does not exist, or the folder is

@@ -260,7 +260,7 @@ Result<std::unique_ptr<ViewTable>> openMpeg4Views(const std::filesystem::path& p
 Result<void> writeMpeg4Views(const ViewTable& table, const std::filesystem::path& path, Job& job,
                              const SceneWriteOptions& scene, const Mpeg4WriteOptions& options) {
     std::optional<PictureSpool> spool;
-    if (path != "-") STX_SET(spool, PictureSpool::create(folderOf(path)));
+    if (path != "-") STX_SET(spool, PictureSpool::create(folderBeside(path)));
     const glm::dvec3 origin = originOf(table);
     noteOrigin(origin, table.about(), job);
     std::unique_ptr<ViewTable> moved;

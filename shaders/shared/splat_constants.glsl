@@ -6,6 +6,9 @@ CONSTANT float kNearest = 1e-12f;
 // Points with this alpha or more, half of a pixel, hide what is behind them. Those of less belong to a
 // silhouette: they lend colour but hide nothing, unless they are glass (splat::Slope). No code of 8 bits is equal to it, but floats are.
 CONSTANT float kHides = 0.5f;
+// Where no such point is, colours of this mean alpha or more are of the skirts of such points. It is a code of 8 bits less,
+// by which sums of codes may be off.
+CONSTANT float kSkirts = kHides - 1.0f / 255.0f;
 // A splat closes its gaps within 2x2 pixels while no point of the surface is farther from a sample
 // than this, squared.
 CONSTANT float kSmallCover2 = 0.9f;

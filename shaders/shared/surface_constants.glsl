@@ -76,6 +76,8 @@ CONSTANT float kBehindGrazing = 0.1f;
 CONSTANT float kBehindNoises = 1.0f;
 // A source that sees a surface this many times as large as another knows better where it is. Of 121 random cases
 // 1.0, 1.5 and 2.0 raise the mean by 0.115, 0.120 and 0.106 dB; a truck loses 0.09, 0.08 and 0.01.
+// Extensions of coarse sources stick out farther: against these it is this divided by what their pixels are in parts of
+// kFinePixel, and at least 1. Of 222 random cases that raises eight by 0.3 to 13 dB and lowers four by 0.3 to 1.2.
 CONSTANT float kSeesBetter = 2.0f;
 // A point this share of its depth in front of a surface is in front of it.
 CONSTANT float kClearlyBehind = 0.0002f;

@@ -114,7 +114,7 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
         left &= left - 1u;
         if (vote == kNoVote && first) enough += silhouette ? kWholeVote : 0;
         if (vote == kNoVote && !first && guess && (closelyBehind >> k & 1u) != 0u && facet.any &&
-            (outermost || sizeIn(s, facet, warp(s, x, y, q)) > kSeesBetter))
+            (outermost || sizeIn(s, facet, warp(s, x, y, q)) > betterThan(self)))
             return true;
         if (left == 0u && first) {
             first = false;

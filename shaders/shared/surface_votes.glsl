@@ -218,6 +218,9 @@ float sizeIn(int s, IN(Facet) facet, vec4 h) {
     return abs(area) * texel * texel / facet.area;
 }
 
+// How many times as large a source must see what another source's extension continues to know better where it is.
+float betterThan(int s) { return max(kSeesBetter / max(coarseOf(s), 1.0f), 1.0f); }
+
 // Whether a point of the frame lies beyond the outermost pixel centres of a source. What the source shows
 // there continues its outermost pixels: a tangent, beside which round surfaces lie behind.
 bool beyondCentres(int s, float x, float y, float q) {

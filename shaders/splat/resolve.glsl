@@ -91,7 +91,7 @@ void resolvePixel(ivec2 at, out vec4 colour, out float dist, out vec3 normal, ou
     if (!(dist < kNone)) {
 #if TRANSLUCENT
         // Only faint splats of a silhouette reach here, or only the skirts of full ones.
-        if (!(colour.a < kHides)) colour = vec4(0.0);
+        if (!(colour.a < kSkirts)) colour = vec4(0.0);
         if (colour.a > 0.0) {
             if (at.x > 0) dist = min(dist, frontAt(at - ivec2(1, 0)));
             if (at.y > 0) dist = min(dist, frontAt(at - ivec2(0, 1)));

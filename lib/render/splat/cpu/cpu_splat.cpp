@@ -368,7 +368,7 @@ void CpuSplatRenderer::resolveBlended(Picture& picture, const Region& region) co
             }
             if (!opaque_ && !hasPoint(depth)) {
                 // Only faint splats of a silhouette reach here, or only the skirts of full ones.
-                if (!(colour.a < kHides)) colour = glm::vec4(0.0f);
+                if (!(colour.a < kSkirts)) colour = glm::vec4(0.0f);
                 if (colour.a > 0)
                     for (const int step : {-1, 1, -region.stride, region.stride})
                         depth = std::min(depth, region.depth[i + step]);

@@ -195,9 +195,9 @@ struct SampleFuser {
             if (!maybe) continue;
             const auto seesBetter = [&](int l, float px, float py, float pq) {
                 const auto& facet = facets.at(votes, l, px, py, pq);
-                return facet.any &&
-                       (votes.beyondCentres(facets.owners[l], px, py, pq) ||
-                        votes.sizeIn(k, facet, votes.warp(k, px, py, pq)) > kSeesBetter);
+                return facet.any && (votes.beyondCentres(facets.owners[l], px, py, pq) ||
+                                     votes.sizeIn(k, facet, votes.warp(k, px, py, pq)) >
+                                         votes.betterThan(facets.owners[l]));
             };
             const Counts better =
                 withVotes(hn::Zero(di), points.x, points.y, points.q, maskOf(maybe), seesBetter);
