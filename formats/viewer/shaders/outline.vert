@@ -1,6 +1,5 @@
 // Each solid point, over the 3x3 pixels around it: lib/render/outline/outlines.cpp.
 #include "formats/viewer/shaders/points.glsl"
-uniform vec2 frameSize;
 
 layout(location = 0) in uvec3 block;  // u0 | v0 << 16, columns | rows << 16, rectangle; a number is behind
 

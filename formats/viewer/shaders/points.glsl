@@ -1,6 +1,8 @@
 // For vertex shaders: a vertex is a pixel of a reference view, an instance a block of 16x16 of them.
 #include "formats/viewer/shaders/scene.glsl"
 
+uniform vec2 frameSize;
+
 // The pixel of a block that a vertex is, u and v in its rectangle; false outside the block.
 bool texelOf(uvec3 block, out uint u, out uint v, out ivec3 texel) {
     uint dx = uint(gl_VertexID) & 15u, dy = uint(gl_VertexID) >> 4u;
@@ -23,5 +25,7 @@ Point pointOf(int rectangle, uint code) {
     p.view.bv = rectangleEntry(rectangle, 5);
     p.source = distanceOf(code, p.view.b0.w, p.view.bu.w, p.view.bv.w);
     p.flatFrame = false;
+    p.opaque = true;  // slopes are linked where alpha is full (prepare.frag)
+    p.largest = max(kLargest, kLargestShare * max(frameSize.x, frameSize.y));
     return p;
 }

@@ -3,7 +3,6 @@
 uniform isampler2DArray slopeTexture;
 uniform sampler2DArray normalTexture;
 uniform vec4 lens;        // 1 / fx, 1 / fy, cx, cy: pixel centres at whole numbers
-uniform vec2 frameSize;
 uniform float splatSize;  // 1 = what the data says
 uniform float mostReach;  // the largest point that the device draws, halved
 
