@@ -37,7 +37,7 @@ struct PackOptions {
     bool prune = false;
     std::string budget;
     PruneSettings pruning;
-    double minPsnr = 0;
+    std::optional<double> minPsnr;
     std::optional<double> time;
     int period = 25;  ///< as the groups of pictures of video
     std::string colour = "png";
@@ -111,14 +111,14 @@ Result<Atlas> packForFile(const ViewTable& views, PackSettings settings, const s
 }
 
 bool prunes(const PackOptions& o) {
-    return o.prune || o.pruning.budget > 0 || o.minPsnr > 0;
+    return o.prune || o.pruning.budget > 0 || o.minPsnr;
 }
 
 Result<PruneReport> pruneOne(Bundle& bundle, const PackOptions& o, const std::string& input,
                              Job& job) {
     return within(fmt::format("'{}'", input),
-                  o.minPsnr > 0 ? pruneToQuality(bundle, o.pruning, o.minPsnr, job)
-                                : prune(bundle, o.pruning, job));
+                  o.minPsnr ? pruneToQuality(bundle, o.pruning, *o.minPsnr, job)
+                            : prune(bundle, o.pruning, job));
 }
 
 /// "12 views in 4 textures 2048x1024, 81.2 % used".
@@ -197,8 +197,8 @@ Result<void> tell(const PackOptions& o, const std::vector<Packed>& atlases, Prog
 
 /// What pruning as it is asked for keeps of views.
 Result<Pruning> pruningOf(const PackOptions& o, const ViewTable& views, Job& job) {
-    return o.minPsnr > 0 ? findPruningToQuality(views, o.pruning, o.minPsnr, job)
-                         : findPruning(views, o.pruning, job);
+    return o.minPsnr ? findPruningToQuality(views, o.pruning, *o.minPsnr, job)
+                     : findPruning(views, o.pruning, job);
 }
 
 /// Prunes views, if that is asked for.
@@ -212,7 +212,7 @@ Result<std::optional<PrunedTo>> pruneViews(const PackOptions& o, const std::stri
         return pruningOf(o, *views, job);
     };
     STX_TRY(auto pruning, within(fmt::format("'{}'", input), found()));
-    const PrunedTo pruned{pruning.report, o.minPsnr > 0};
+    const PrunedTo pruned{pruning.report, o.minPsnr.has_value()};
     views = prunedViews(std::move(views), std::move(pruning));
     return pruned;
 }
@@ -382,7 +382,7 @@ Result<int> packSheet(const PackOptions& o, const Command& command, Program& pro
                     "without a number",
                     o.output, counted(o.inputs.size(), "input"));
     STX_TRY(const auto names, objectNames(o));
-    if (o.inputs.size() > 1 && (!o.budget.empty() || o.minPsnr > 0))
+    if (o.inputs.size() > 1 && (!o.budget.empty() || o.minPsnr))
         program.job.note(
             fmt::format("{} is met by each object", o.budget.empty() ? "--min-psnr" : "--budget"));
     std::vector<std::unique_ptr<Sequence>> frames(o.inputs.size());
@@ -467,7 +467,7 @@ Result<int> packInput(const PackOptions& options, const Command& command, Progra
     if (!program.common.report.empty() && count > 1)
         return fail(ErrorCode::usage,
                     "--report is of one atlas, and {} are made; give --time T for one", count);
-    if (!o.budget.empty() || o.minPsnr > 0)
+    if (!o.budget.empty() || o.minPsnr)
         program.job.note(fmt::format("{} is met by each frame; what one of {} keeps, all keep",
                                      o.budget.empty() ? "--min-psnr" : "--budget",
                                      counted(o.period, "frame")));

@@ -94,8 +94,9 @@ Pruning nothingPruned(const ViewTable& table, const PruneReport& tried) {
 
 Result<Pruning> findPruningToQuality(const ViewTable& table, const PruneSettings& settings,
                                      double wantedPsnr, Job& job) {
-    if (!(wantedPsnr > 0) || std::isinf(wantedPsnr))
-        return fail(ErrorCode::usage, "the least PSNR is {:g} dB; it must be over 0", wantedPsnr);
+    if (!(wantedPsnr >= 0) || std::isinf(wantedPsnr))
+        return fail(ErrorCode::usage, "the least PSNR is {:g} dB; it must be 0 or more",
+                    wantedPsnr);
     STX_CHECK(checkPruning(table, job.limits));
     STX_CHECK(job.limits.checkAllocation(memoryOfAll(table, kDrawnAfterPruning), 1,
                                          kDrawnAfterPruning.what));

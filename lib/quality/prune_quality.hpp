@@ -5,10 +5,10 @@
 
 namespace stx {
 
-/// Prunes as far as rendered pictures still reach `wantedPsnr` (RGB, dB, over 0): the blocks that
-/// replacements show worst come back until they do. Pictures are of surface mode at normal quality,
-/// before and after, from up to six of the views' own poses and from half way between each of
-/// these and the view nearest to it, at most 1024 pixels to a side; the worst counts, and
+/// Prunes as far as rendered pictures still reach `wantedPsnr` (RGB, dB, 0 or more): the blocks
+/// that replacements show worst come back until they do. Pictures are of surface mode at normal
+/// quality, before and after, from up to six of the views' own poses and from half way between each
+/// of these and the view nearest to it, at most 1024 pixels to a side; the worst counts, and
 /// PruneReport::psnr is its PSNR. When nothing less than all pixels reaches it, all stay.
 /// `settings.minPsnr` is not looked at. Notes of attempts that were given up are not passed on.
 /// Errors: those of prune(); a budget that forbids what was asked, with both.

@@ -42,5 +42,20 @@ TEST(PruneQuality, NotesOfAttemptsThatWereGivenUpAreNotPassedOn) {
     EXPECT_EQ(job.takeNotes(), notesOfOne);
 }
 
+TEST(PruneQuality, NoQualityAtAllIsAWishToo) {
+    const Bundle whole = torusViews(96);
+    Job job;
+    Bundle none = whole, hardlyAny = whole;
+    const auto atZero = pruneToQuality(none, {}, 0, job);
+    const auto above = pruneToQuality(hardlyAny, {}, 0.001, job);
+    ASSERT_TRUE(atZero) << atZero.error().message;
+    ASSERT_TRUE(above) << above.error().message;
+    EXPECT_LT(atZero->keptPixels, atZero->sourcePixels);
+    EXPECT_EQ(atZero->keptPixels, above->keptPixels);
+    const auto below = pruneToQuality(none, {}, -1, job);
+    ASSERT_FALSE(below);
+    EXPECT_EQ(below.error().message, "the least PSNR is -1 dB; it must be 0 or more");
+}
+
 }  // namespace
 }  // namespace stx
