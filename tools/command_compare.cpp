@@ -358,7 +358,7 @@ void addCompare(CommandLine& line, Program& program) {
         .range(-1.0, 1.0)
         .takes("SSIM");
     c.option("--first-frame", o->firstFrame, "First frame of sequences (default 0)").notNegative();
-    c.option("--frames", o->frames, "Number of frames (default: all that exist)").notNegative();
+    c.option("--frames", o->frames, "Number of frames (default: all that exist)").positive();
     c.sharedOptions(program.common, kFormat | kOutput | kPictures);
     c.runs([o, c](Program& p) { return compareImages(*o, c, p); });
 }

@@ -415,7 +415,7 @@ void addDrawing(Command c, RenderOptions& o) {
         "Size and shape of splats: data, paper or point (default data)");
     c.option("--splat-coefficient", o.settings.splatCoefficient,
              "Of --splat paper: pixels times scene units (default: fitted)")
-        .notNegative();
+        .positive();
     c.choice<Fill>("--fill", o.settings.fill,
                    {{"background", Fill::background}, {"none", Fill::none}},
                    "What no view shows: background (--background temporal) or none (default "

@@ -205,7 +205,7 @@ void addSelect(CommandLine& line, Program& program) {
         .takes("PERCENT");
     c.option("--density", o->settings.targetDensity,
              "Wanted samples per scene unit (default: what the views typically have)")
-        .notNegative();
+        .positive();
     c.option("--plot", o->plot, "Draw quality against the number of views").writes("FILE.svg");
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
