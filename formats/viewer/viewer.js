@@ -11,6 +11,7 @@ class Viewer {
         this.pointers = new Map();
         this.quick = false;
         this.slow = false;
+        this.notTaken = "";  // what the address has that means nothing, as a sentence
         this.drawn = new Promise((resolve) => (this.firstDrawn = resolve));
     }
 
@@ -25,14 +26,14 @@ class Viewer {
         });
         this.canvas.addEventListener("webglcontextrestored", () => {
             this.painter = new Painter(this.canvas);
-            this.showFrame(this.frame).then(() => this.say(""));
+            this.showFrame(this.frame).then(() => this.say(this.notTaken));
         });
         this.fillPanel();
         this.reset();
         this.readAddress();
         this.connect();
         await this.showFrame(this.frame);
-        this.say("");
+        this.say(this.notTaken);
         this.draw();
         this.firstDrawn();
     }
@@ -249,9 +250,12 @@ class Viewer {
         } catch (error) {
             // Some browsers keep the address of local files as it is.
         }
+        // What meant nothing is not in it.
+        if (this.notTaken && document.getElementById("message").textContent === this.notTaken) this.say("");
+        this.notTaken = "";
     }
 
-    // Takes all from the address; what it does not name is as at the start.
+    // Takes all from the address; what it does not name is as at the start, and so is what means nothing, which notTaken says.
     readAddress() {
         const decoded = (text) => {
             try {
@@ -261,36 +265,50 @@ class Viewer {
             }
         };
         const fields = new Map(location.hash.slice(1).split("&").map((part) => part.split("=").map(decoded)));
-        const numbers = (name, count) => {
-            const list = (fields.get(name) || "").split(",").map(Number);
-            return fields.has(name) && list.length === count && list.every(Number.isFinite) ? list : null;
+        const wrong = [];
+        const refuse = (name, expected) => void wrong.push(`${name}=${fields.get(name) || ""} (${expected} is expected)`);
+        const numbers = (name, count, expected, possible = () => true) => {
+            if (!fields.has(name)) return null;
+            const list = (fields.get(name) || "-").split(",").map((text) => text.trim() ? Number(text) : NaN);
+            return list.length === count && list.every(Number.isFinite) && possible(list) ? list : refuse(name, expected);
         };
-        const size = (fields.get("size") || "").match(/^(\d+)x(\d+)$/), most = this.painter.mostSide;
+        const point = (name) => numbers(name, 3, "X,Y,Z");
+        const direction = (name) => numbers(name, 3, "X,Y,Z, not all of them 0,", (list) => lengthOf(list) > 0);
+        const matching = (name, expected, pattern) => {
+            const found = (fields.get(name) || "").match(pattern);
+            return fields.has(name) && !found ? refuse(name, expected) : found;
+        };
+        this.notTaken = "";
+        const size = matching("size", "WIDTHxHEIGHT, as 640x480,", /^(\d+)x(\d+)$/), most = this.painter.mostSide;
         this.size = size ? [Number(size[1]), Number(size[2])] : null;
         if (size && !this.size.every((side) => side >= 1 && side <= most))
             throw new Error(`#size=${size[0]} is not possible; on this device sides have 1 to ${most} pixels`);
         if (size) Object.assign(this.canvas.style, {width: size[1] + "px", height: size[2] + "px"});
         this.reset();
-        const c = this.camera, eye = numbers("eye", 3), target = numbers("target", 3), up = numbers("up", 3), fov = numbers("fov", 1);
+        const c = this.camera, eye = point("eye"), target = point("target"), up = direction("up");
+        const fov = numbers("fov", 1, "one number above 0 and below 180", ([angle]) => angle > 0 && angle < 180);
         if (eye) c.eye = minus(eye, this.data.origin);
         if (target) c.target = minus(target, this.data.origin);
-        if (up && lengthOf(up) > 0) c.up = up;
-        if (fov && fov[0] > 0 && fov[0] < 180) c.fov = fov[0];
+        if (up) c.up = up;
+        if (fov) c.fov = fov[0];
         this.setValue("fov", c.fov);
-        const time = numbers("time", 1), light = numbers("light", 3), splat = numbers("splat", 1);
+        const time = numbers("time", 1, "one number"), light = direction("light");
+        const splat = numbers("splat", 1, "one number above 0", ([factor]) => factor > 0);
         this.frame = time ? this.frameAt(time[0]) : 0;
         for (const id of ["light-turn", "light-height", "ambient", "specular", "splat-size"])
             this.setValue(id, Number(document.getElementById(id).defaultValue));
-        if (splat && splat[0] > 0) this.setValue("splat-size", splat[0]);
+        if (splat) this.setValue("splat-size", splat[0]);
         document.getElementById("light").checked = false;
-        if (light && lengthOf(light) > 0) this.setLight(light);
+        if (light) this.setLight(light);
         for (const name of ["ambient", "specular"]) {
-            const amount = numbers(name, 1);
-            if (amount && amount[0] >= 0) this.setValue(name, amount[0]);
+            const amount = numbers(name, 1, "one number, 0 or more,", ([value]) => value >= 0);
+            if (amount) this.setValue(name, amount[0]);
         }
-        this.background = /^#[0-9a-f]{6}$/i.test(fields.get("background") || "") ? fields.get("background") : "";
+        const background = matching("background", "%23rrggbb", /^#[0-9a-f]{6}$/i);
+        this.background = background ? background[0] : "";
         document.getElementById("background").selectedIndex = 0;
         document.getElementById("panel").hidden = fields.get("ui") === "off";
+        if (wrong.length) this.notTaken = "Not taken from the address: " + wrong.join("; ") + ".";
     }
 
     // The sliders for a light that travels in a direction.
@@ -363,9 +381,11 @@ class Viewer {
         on("view", "change", () => this.fromView(document.getElementById("view").value));
         on("panel", "submit", (event) => event.preventDefault());
         window.addEventListener("hashchange", () => {
+            const message = document.getElementById("message"), before = this.notTaken;
             try {
                 this.readAddress();
-                if (document.getElementById("message").className === "failed") this.say("");
+                // Another message stays: of images that are read, of a device that was lost.
+                if (message.className === "failed" || message.textContent === before) this.say(this.notTaken);
             } catch (error) {
                 this.size = null;
                 this.fail(error);

@@ -340,10 +340,27 @@ def captured(test, browser, args):
 
 
 def odd_addresses(test, browser):
-    """What codes nothing is passed over; nothing that the page does is against its own policy."""
-    for address in ("%", "eye=%E0%A4%A&fov=%", "eye=1,2&up=x&=&&"):
-        show(browser, test.path("amphora.html"), address)
-        test.check(browser.ask("viewer.camera.fov > 0"), f"a page draws at #{address}")
+    """What means nothing is passed over and said; nothing that the page does is against its own policy."""
+    said = "document.getElementById('message').textContent"
+    show(browser, test.path("amphora.html"), "%")
+    start = browser.ask("JSON.stringify([viewer.camera, viewer.look()])")
+    number, three, any_three = "one number, 0 or more, is", "X,Y,Z is", "X,Y,Z, not all of them 0, is"
+    for address, expected in (("eye=%E0%A4%A&fov=%", f"eye=%E0%A4%A ({three} expected); fov=% (one number above 0 and below 180 is expected)"),
+                              ("eye=1,2&up=-Y&=&&", f"eye=1,2 ({three} expected); up=-Y ({any_three} expected)"),
+                              ("ambient=0.9,0.1,0.1", f"ambient=0.9,0.1,0.1 ({number} expected)"),
+                              ("light=0,0,0&splat=&time=soon", f"time=soon (one number is expected); light=0,0,0 ({any_three} expected); "
+                                                               "splat= (one number above 0 is expected)"),
+                              ("background=red&size=640", "size=640 (WIDTHxHEIGHT, as 640x480, is expected); "
+                                                          "background=red (%23rrggbb is expected)")):
+        browser.open(f"file://{test.path('amphora.html')}#{address}")
+        browser.until(f"typeof viewer === 'object' && {said}.startsWith('Not taken')")
+        test.check(browser.ask(said) == f"Not taken from the address: {expected}.", f"a page at #{address} says: {browser.ask(said)}")
+        test.check(browser.ask("JSON.stringify([viewer.camera, viewer.look()])") == start, f"a page draws at #{address} as at the start")
+    browser.ask("location.hash = 'specular=-1'")
+    browser.until(f"{said} === 'Not taken from the address: specular=-1 ({number} expected).'")
+    browser.ask("viewer.changed()")
+    browser.until(f"{said} === ''")
+    test.check("specular" not in browser.ask("location.hash"), "what is not taken is said until the page writes its address")
     for size in ("0x0", "99999x99999", "1x100000"):
         try:
             show(browser, test.path("amphora.html"), f"size={size}")
