@@ -402,7 +402,7 @@ void addExtract(CommandLine& line, Program& program) {
         .oneOf({"png", "jpeg", "exr"});
     c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100);
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
-    c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").range(0, 30);
+    c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").zeroOrRange(2, 30);
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return extract(*o, c, p); });

@@ -30,7 +30,7 @@ std::vector<std::string> choicesIn(const std::string& text) {
     return choices;
 }
 
-/// What CLI11 says of a range, "INT in [1 - 8]" or "POSITIVE", for people.
+/// What CLI11 says of a range, "INT in [1 - 8]", "INT in [0, or 2 - 8]" or "POSITIVE", for people.
 std::string rangeIn(const std::string& text) {
     const auto open = text.find("in ["), dash = text.find(" - ", open), end = text.find(']', dash);
     if (open != std::string::npos && end != std::string::npos)
@@ -277,6 +277,12 @@ Option& Option::range(double least, double most) {
                               fmt::format("in [{:.10g} - {:.10g}]", least, most)));
     return *this;
 }
+Option& Option::zeroOrRange(int least, int most) {
+    option_->check(numberThat([=](double v) { return v != 0 && (v < least || v > most); },
+                              fmt::format("0, or {} to {} is possible", least, most),
+                              fmt::format("in [0, or {} - {}]", least, most)));
+    return *this;
+}
 Option& Option::notNegative() {
     option_->check(
         numberThat([](double v) { return v < 0; }, "it must be 0 or more", "NONNEGATIVE"));
@@ -326,7 +332,12 @@ Option Command::option(const std::string& names,
                        std::function<Result<void>(const std::string&)> parse,
                        const std::string& help) {
     const auto take = [names, parse = std::move(parse)](const std::string& text) {
-        if (auto ok = parse(text); !ok) throw CLI::ValidationError(names, ok.error().message);
+        const auto ok = parse(text);
+        if (ok) return;
+        // Some sentences begin with the option: its name once is enough.
+        const std::string& message = ok.error().message;
+        if (message.starts_with(names + " ")) throw CLI::ValidationError(message);
+        throw CLI::ValidationError(names, message);
     };
     return added(app_->add_option_function<std::string>(names, take, help), true);
 }
@@ -343,7 +354,7 @@ void Command::sharedOptions(CommonOptions& to, unsigned which) {
     CLI::Option* memory =
         app_->add_option("--max-memory", to.maxMemoryMiB,
                          "Refuse inputs that would need more memory, in MiB (default 4096)");
-    c.added(memory->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 24)), true);
+    c.added(memory, true).range(1, 1 << 24);
     c.choice("--decoder-isolation", to.requireIsolation, {{"auto", false}, {"required", true}},
              "Decode foreign files as shut in as this kernel can, or only where it filters system "
              "calls (default auto)");

@@ -60,6 +60,8 @@ class Option {
     Option& oneOf(std::initializer_list<int> numbers);
     Option& range(int least, int most);
     Option& range(double least, double most);
+    /// 0, which has a meaning of its own, or a number of the range.
+    Option& zeroOrRange(int least, int most);
     Option& notNegative();
     Option& positive();
 

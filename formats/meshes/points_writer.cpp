@@ -83,15 +83,18 @@ Bytes plyRows(const PointCloud& points, const PlyContents& contents) {
     return bytes;
 }
 
+/// Errors (usage): bits that Draco cannot code with.
+Result<void> checkDracoBits(const char* field, int bits, int least) {
+    constexpr int kMost = 30;  // of Draco's quantisation
+    if (bits == 0 || (bits >= least && bits <= kMost)) return {};
+    return fail(ErrorCode::usage,
+                "{} is {}; Draco codes with {} to {} bits, and 0 keeps floats exact", field, bits,
+                least, kMost);
+}
+
 Result<Bytes> encodeDraco(const PointCloud& points, Job& job, const PointWriteOptions& options) {
-    const auto inRange = [](int bits, int least) {
-        return bits == 0 || (bits >= least && bits <= 30);
-    };
-    if (!inRange(options.positionBits, 1) || !inRange(options.normalBits, 2))
-        return fail(
-            ErrorCode::usage,
-            "Draco codes positions with 1 to 30 bits and normals with 2 to 30, not {} and {}",
-            options.positionBits, options.normalBits);
+    STX_CHECK(checkDracoBits("positionBits", options.positionBits, 1));
+    STX_CHECK(checkDracoBits("normalBits", options.normalBits, 2));
     const auto n = static_cast<draco::PointIndex::ValueType>(points.positions.size());
     draco::PointCloudBuilder builder;
     builder.Start(n);

@@ -545,8 +545,16 @@ TEST_F(WritePoints, BadRequests) {
     Job job;
     EXPECT_EQ(writePoints(folder_ / "p.xyz", cloud(), job).error().code, ErrorCode::usage);
     EXPECT_EQ(writePoints(folder_ / "p.ply", {}, job).error().code, ErrorCode::invalidInput);
-    EXPECT_EQ(writePoints(folder_ / "p.drc", cloud(), job, {.positionBits = 31}).error().code,
-              ErrorCode::usage);
+    const auto messageOf = [&](const PointWriteOptions& options) {
+        const auto written = writePoints(folder_ / "p.drc", cloud(), job, options);
+        if (written || written.error().code != ErrorCode::usage) return std::string("taken");
+        return written.error().message;
+    };
+    // The field that is wrong, and no other.
+    EXPECT_EQ(messageOf({.positionBits = 31}),
+              "positionBits is 31; Draco codes with 1 to 30 bits, and 0 keeps floats exact");
+    EXPECT_EQ(messageOf({.normalBits = 1}),
+              "normalBits is 1; Draco codes with 2 to 30 bits, and 0 keeps floats exact");
     colours_.pop_back();
     EXPECT_EQ(writePoints(folder_ / "p.ply", cloud(), job).error().code, ErrorCode::invalidInput);
     colours_.emplace_back();
