@@ -82,10 +82,13 @@ OpenOptions openOptions(const ConvertOptions& o, const std::shared_ptr<bool>& im
 /// Heading of the help that options of image sets are under.
 constexpr const char* kSetHeading = "Image sets";
 
+constexpr const char* kTimesFromStart = "--times-from-start";
+
 /// Notes the options that do not matter to this input.
 void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptions& o,
                 Program& program) {
-    GivenOptions given{o.givenOfMeshes, o.givenOfSets, {}};
+    GivenOptions given{o.givenOfMeshes, o.givenOfSets, {}, {}};
+    if (o.open.timesFromStart) given.ofMpeg4 = {kTimesFromStart};
     if (o.refining.steps != "auto" && o.refining.steps != "off") given.ofViews = {"--refine"};
     if (o.cube) given.ofViews.push_back("--cube");
     noteUnusedOptions(input, as, given, o.open, program.job);
@@ -250,6 +253,8 @@ Result<nlohmann::ordered_json> convertOne(const BatchItem& item, const ConvertOp
                                 o.mesh->depthBits.has_value(), countPoints, program.job));
         if (passed) {
             noteUnused(input, Reads::moment, o, program);
+            if (o.open.timesFromStart)
+                program.job.noteUnused({kTimesFromStart}, "", "the scene is written as it is");
             done = summaryOf(*passed, countPoints);
             if (done->views == 0)
                 program.job.note("the scene shows no view with images; it is written as it is");
@@ -559,7 +564,7 @@ void addConvert(CommandLine& line, Program& program) {
         .required()
         .replaces("OUT");
     addMeshViewOptions(c, o->mesh);
-    c.flag("--times-from-start", o->open.timesFromStart,
+    c.flag(kTimesFromStart, o->open.timesFromStart,
            "MPEG-4: startTime and stopTime that come with a later access unit count from the "
            "start, and not from that unit");
     c.under(MeshViewOptions::kHeading)

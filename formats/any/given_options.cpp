@@ -48,6 +48,8 @@ void noteUnusedOptions(const std::filesystem::path& input, Reads as, const Given
     } else {
         note(given.ofViews, "of inputs with views", nameOf(FileKind::mesh));
     }
+    if (!options.set.from.empty() || !kind || *kind != FileKind::mpeg4)
+        note(given.ofMpeg4, "of MPEG-4 scenes", kind ? nameOf(*kind) : "none");
     if (set) return;
     auto names = given.ofSets;
     if (as == Reads::film) take(names, "strict");

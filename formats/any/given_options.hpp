@@ -18,7 +18,8 @@ enum class Reads { mesh, moment, film };
 struct GivenOptions {
     std::vector<std::string> ofMeshes;
     std::vector<std::string> ofSets;
-    std::vector<std::string> ofViews;  ///< of whatever has views already
+    std::vector<std::string> ofViews;    ///< of whatever has views already
+    std::vector<std::string> ofMpeg4{};  ///< of how scenes of MPEG-4 are read
 };
 
 /// Notes the options that do not matter to this input: lists of many inputs may hold others that
