@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <set>
+#include <sstream>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -34,6 +36,23 @@ std::string stepsOf(const RefineOptions& o) {
             at = end + 1;
         }
     return text;
+}
+
+/// Errors (usage): a step that is both asked for and left out.
+Result<void> checkNoContradiction(const RefineOptions& o) {
+    const auto names = [](const std::string& text) {
+        std::set<std::string> found;
+        std::stringstream list(text);
+        for (std::string name; std::getline(list, name, ',');) found.insert(name);
+        return found;
+    };
+    const auto with = names(o.with);
+    for (const std::string& name : names(o.without))
+        if (with.contains(name))
+            return fail(ErrorCode::usage,
+                        "--with and --without both name the step '{}'; give it to one of them",
+                        name);
+    return {};
 }
 
 nlohmann::ordered_json stepsJson(const RefineReport& report) {
@@ -93,6 +112,7 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
         STX_CHECK(
             command.refuse({"--with", "--without"}, "does not go with --only; give one of them"));
     STX_TRY(const auto settings, RefineSettings::from(stepsOf(o)));
+    STX_CHECK(checkNoContradiction(o));
     const std::uint64_t inputBytes = bytesOf(o.input);  // before the output takes its place
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(containerOf(o.output));
