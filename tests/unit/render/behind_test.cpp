@@ -110,6 +110,24 @@ TEST(Behind, WhatASourceSeesPastIsNotThereNow) {
     }
 }
 
+/// The block never left its place: its background is open there, and filled like that of a view
+/// alone.
+TEST(Behind, WhatWasNeverSeenIsFilledFromAround) {
+    Bundle bundle = wallWithBackground();
+    ReferenceView& wall = bundle.views[1];
+    for (int y = 8; y < kHeight; ++y) {
+        for (int x = 18; x < 30; ++x) {
+            wall.depth.at(x, y) = kNoDepth;
+            wall.texture.rgba8()->at(x, y) = glm::u8vec4(0);
+        }
+    }
+    const Frame drawn = draw(bundle, RenderMode::surface, Fill::background, besideWall());
+    for (const std::size_t p : uncovered()) {
+        ASSERT_NEAR(drawn.colour.data()[p].a, 1.0f, 0.01f);
+        ASSERT_NEAR(drawn.depth.data()[p], kWall, 0.1f);
+    }
+}
+
 TEST(Behind, LiesUnderByWhatIsOpen) {
     Frame front, background;
     front.colour = Image<glm::vec4>(4, 1, glm::vec4(0.0f));

@@ -34,7 +34,15 @@ struct LookedAt : SourcePixels {
         return within(kBorder);
     }
     [[nodiscard]] bool seesPast(int s, float x, float y, float q) {
-        return voteOf(s, x, y, q) != kNoVote;
+        return voteOf(s, x, y, q) != kNoVote && !isOpenBackground(s, x, y, q);
+    }
+    /// Background views are open where it was never seen what is behind: something hid it.
+    [[nodiscard]] bool isOpenBackground(int s, float x, float y, float q) {
+        const Source& source = at(s);
+        if (!source.view->background) return false;
+        const vec4 h = warp(s, x, y, q);
+        const ivec2 pixel(floor(vec2(h.x, h.y) / h.w));
+        return !source.contains(pixel.x, pixel.y) || !(source.q(pixel.x, pixel.y) > 0.0f);
     }
 #include "shaders/shared/surface_votes.glsl"
 };
