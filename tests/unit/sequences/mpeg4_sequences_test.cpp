@@ -338,6 +338,24 @@ TEST(MediaClock, ADelayIsOneOfTheEditsToo) {
     EXPECT_NEAR(shown.duration, 1.12, 1e-9);
 }
 
+TEST(MediaClock, ALastEditWithoutADurationIsTheRest) {
+    // ISO/IEC 14496-12, 8.6.6.
+    ElementaryStream stream = streamOf({0, 40, 80, 120});
+    stream.edits = {1000, {{0, 80, 0x10000}}};
+    Presentation shown = presentationOf(stream);
+    ASSERT_EQ(shown.shown.size(), 2u);
+    EXPECT_EQ(shown.sampleAt(0, kSlack), 2u);
+    EXPECT_EQ(shown.sampleAt(0.04, kSlack), 3u);
+    EXPECT_NEAR(shown.duration, 0.08, 1e-9);
+    // Behind a delay, and behind another edit.
+    stream.edits = {1000, {{100, -1, 0x10000}, {40, 0, 0x10000}, {0, 120, 0x10000}}};
+    shown = presentationOf(stream);
+    ASSERT_EQ(shown.shown.size(), 2u);
+    EXPECT_EQ(shown.sampleAt(0.1, kSlack), 0u);
+    EXPECT_EQ(shown.sampleAt(0.14, kSlack), 3u);
+    EXPECT_NEAR(shown.duration, 0.18, 1e-9);
+}
+
 TEST(MediaClock, ShortListsDoNotBecomeLongOnes) {
     // Each edit shows all pictures again: nine million of 3000 edits.
     ElementaryStream stream;
