@@ -169,6 +169,28 @@ TEST(Mpeg4Sequences, WhatCannotMoveIsSaid) {
     EXPECT_EQ(one.error().code, ErrorCode::usage);
 }
 
+TEST(ExrSequences, FilesOfAFilmHaveTheSameViews) {
+    class Shrinks : public MovingViews {
+      public:
+        using MovingViews::MovingViews;
+        Result<Bundle> frame(std::size_t index, Job& job) override {
+            auto bundle = MovingViews::frame(index, job);
+            if (index == 2) bundle->views.pop_back();
+            return bundle;
+        }
+    };
+    TemporaryFolder folder("sequences");
+    Job job;
+    Shrinks frames(4);
+    const auto saved = saveSequence(frames, folder / "a_%03d.exr", {}, job);
+    ASSERT_FALSE(saved);
+    EXPECT_EQ(saved.error().code, ErrorCode::invalidInput);
+    EXPECT_EQ(saved.error().text(),
+              "frame 2 (0.08 s): 1 view at 0.08 s, but 2 at the start; the files of a film have "
+              "the same views; stx render and stx extract take one whose views change");
+    EXPECT_FALSE(std::filesystem::exists(folder / "a_000.exr"));
+}
+
 namespace {
 
 /// Two frames at times of its own.
