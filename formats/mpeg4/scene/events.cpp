@@ -69,7 +69,7 @@ std::string nameOf(const NodePtr& node, int field) {
 /// (ISO/IEC 14772-1, 6.28).
 void keepEndedRun(Node& node, int field, double now, const ActiveNode& active) {
     const std::string& name = node.info->fields[field].name;
-    if (!active || !node.is("MovieTexture") ||
+    if (!active || node.proto || !node.is("MovieTexture") ||
         (name != "startTime" && name != "stopTime" && name != "speed" && name != "loop"))
         return;
     if (active(node, now)) {
