@@ -333,8 +333,17 @@ Result<void> saveNumbered(Sequence& frames, const fs::path& target, const SaveOp
     each.summaries = SaveOptions::Summaries::none;
     const std::size_t count = frames.timeline().count();
     OutputFiles files;
+    Bundle first;  // headers: files with other views than these are no film
     const auto add = [&](std::size_t i) -> Result<void> {
         STX_TRY(const auto table, frames.views(i, job));
+        const Bundle& about = std::as_const(*table).about();
+        if (i == 0)
+            first = headersOf(about);
+        else if (auto same = checkSameViews(first, about); !same)
+            return fail(same.error().code,
+                        "{}; the files of a film have the same views; stx render and stx extract "
+                        "take one whose views change",
+                        same.error().message);
         return saveViews(*table, *frameName(target.string(), static_cast<int>(i)), each, job,
                          &files);
     };

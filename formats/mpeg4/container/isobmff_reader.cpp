@@ -272,6 +272,18 @@ class Reader {
         return &(samples_[track.facts.trackId] = std::move(samples));
     }
 
+    /// The same of a stream of commands, at the times that its edit list gives them.
+    Result<const std::vector<Sample>*> commandsOf(Mp4Track& track) {
+        STX_CHECK(samplesOf(track));
+        std::vector<Sample>& samples = samples_.at(track.facts.trackId);
+        if (!editCommands(track.stream.edits, track.stream.timescale, samples))
+            job_.note(
+                fmt::format("the edit list of track {} ('{}') is not followed: it leaves commands "
+                            "out, or is more than a delay and one edit at normal speed",
+                            track.facts.trackId, printable(track.facts.handler)));
+        return &samples;
+    }
+
     /// Memory that the document takes by naming a track again and again.
     Result<void> useBudget(std::uint64_t bytes, const std::string& place) {
         spent_ += bytes;
@@ -330,7 +342,7 @@ class Reader {
 
     Result<void> readObjectDescriptors() {
         if (od_ == nullptr) return {};
-        STX_TRY(const std::vector<Sample>* samples, samplesOf(*od_));
+        STX_TRY(const std::vector<Sample>* samples, commandsOf(*od_));
         document_.odStream.edits = od_->stream.edits;
         document_.odStream.samples = *samples;
         const DescriptorContext context{od_->mpod, &facts().deviations};
@@ -364,7 +376,7 @@ class Reader {
             return failAt(scene_->path, ErrorCode::invalidInput,
                           "the scene track has no 'esds' box, so no BIFS config");
         STX_TRY(document_.bifsConfig, configOf(*scene_));
-        STX_TRY(const std::vector<Sample>* samples, samplesOf(*scene_));
+        STX_TRY(const std::vector<Sample>* samples, commandsOf(*scene_));
         document_.sceneStream.edits = scene_->stream.edits;
         document_.sceneStream.samples = *samples;
         // Access units of all streams of the scene in the order of time; streams that build on
@@ -380,7 +392,7 @@ class Reader {
                                 config ? "its data are in another file" : config.error().text()));
                 continue;
             }
-            STX_TRY(const std::vector<Sample>* more, samplesOf(*track));
+            STX_TRY(const std::vector<Sample>* more, commandsOf(*track));
             const double scale = static_cast<double>(scene_->stream.timescale) /
                                  std::max<std::uint32_t>(track->stream.timescale, 1);
             for (const Sample& sample : *more)

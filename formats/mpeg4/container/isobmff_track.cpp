@@ -529,6 +529,29 @@ Result<std::vector<Sample>> readSamples(Mp4Track& track, const ByteSource& sourc
     return samples;
 }
 
+bool editCommands(EditList& edits, std::uint32_t timescale, std::vector<Sample>& samples) {
+    const std::vector<Edit>& list = edits.edits;
+    if (list.empty()) return true;
+    const bool delayed = list.size() == 2 && list[0].mediaTime == -1;
+    const Edit& shown = list.back();
+    if (list.size() != (delayed ? 2u : 1u) || shown.mediaTime < 0 || shown.rate != 0x10000 ||
+        edits.timescale == 0 || list[0].duration > std::numeric_limits<std::uint32_t>::max())
+        return false;
+    const double ticks = static_cast<double>(timescale) / edits.timescale;
+    const double delay = delayed ? std::round(static_cast<double>(list[0].duration) * ticks) : 0;
+    // Its end was rounded to a tick of the movie, as writers do.
+    const double end = (static_cast<double>(shown.duration) + 0.5) * ticks;
+    const auto from = static_cast<std::uint64_t>(shown.mediaTime);
+    const auto inEdit = [&](const Sample& sample) {
+        return sample.time > from ? sample.time - from : 0;
+    };
+    for (const Sample& sample : samples)
+        if (shown.duration != 0 && static_cast<double>(inEdit(sample)) >= end) return false;
+    for (Sample& sample : samples) sample.time = static_cast<std::uint64_t>(delay) + inEdit(sample);
+    edits = {};
+    return true;
+}
+
 void sumSamples(Mp4Track& track) {
     if (track.stsz.type.empty()) return;
     auto sizes = SampleSizes::read(track.stsz);

@@ -51,6 +51,13 @@ struct Mp4Track {
                                                       std::uint32_t movieTimescale,
                                                       const Limits& limits);
 
+/// Puts the edit list of a stream of commands (a scene's, or its object descriptors') into their
+/// times: what comes before an edit acts at its start, as a scene is the sum of its commands. True
+/// where the stream has no edits then; false, and nothing changes, where the list is more than one
+/// edit at normal speed behind a delay, or leaves commands out.
+[[nodiscard]] bool editCommands(EditList& edits, std::uint32_t timescale,
+                                std::vector<Sample>& samples);
+
 /// Fills in facts.sampleCount and facts.bytes from the table of sizes alone; leaves them 0 where it
 /// is damaged. For tracks that nobody reads.
 void sumSamples(Mp4Track& track);

@@ -14,17 +14,35 @@ struct Run {
     double loopsUntil = 0;
 };
 
-Run runOf(const Node& texture) {
-    Run run;
-    if (!texture.is("MovieTexture")) return run;
-    run.start = texture.get<double>("startTime");
-    run.stop = texture.get<double>("stopTime");
-    run.speed = static_cast<double>(texture.get<float>("speed"));
-    run.loopsUntil = loopsUntil(texture);
+Run usable(const Node::EndedRun& fields) {
+    Run run{fields.start, fields.stop, static_cast<double>(fields.speed), fields.loopsUntil};
     if (!std::isfinite(run.start)) run.start = 0;
     if (!std::isfinite(run.stop)) run.stop = 0;
     if (!std::isfinite(run.speed)) run.speed = 1;
     return run;
+}
+
+/// The run that a texture's startTime began or will begin.
+Run runOf(const Node& texture) {
+    if (!texture.is("MovieTexture")) return {};
+    const Node::EndedRun fields{texture.get<double>("startTime"), texture.get<double>("stopTime"),
+                                texture.get<float>("speed"), loopsUntil(texture)};
+    // One that has ended runs no further by what was changed since, but for its loop.
+    const bool over =
+        texture.ended && texture.ended->start == fields.start && fields.loopsUntil != kEver;
+    return usable(over ? *texture.ended : fields);
+}
+
+/// The run whose picture a texture shows: until the next begins, that of the last.
+Run shownRun(const Node& texture, double now) {
+    const Run run = runOf(texture);
+    return texture.ended && now < run.start ? usable(*texture.ended) : run;
+}
+
+std::optional<ClockRun> clockOf(const Run& run, double duration) {
+    const double cycle = duration / std::abs(run.speed);
+    if (run.speed == 0 || !(cycle > 0)) return {};
+    return ClockRun(run.start, cycle, run.stop, run.loopsUntil);
 }
 
 }  // namespace
@@ -82,10 +100,13 @@ Presentation presentationOf(const ElementaryStream& stream) {
     edited.tick = std::max(tick, editTick);
     for (const Edit& edit : stream.edits.edits) {
         const double from = edited.duration;
-        const double length = static_cast<double>(edit.duration) * editTick;
+        const double media = static_cast<double>(edit.mediaTime) * tick + delay;
+        double length = static_cast<double>(edit.duration) * editTick;
+        // Of a last edit, 0 is all that is left of the stream.
+        if (edit.duration == 0 && edit.mediaTime >= 0 && &edit == &stream.edits.edits.back())
+            length = std::max(0.0, all.duration - media);
         edited.duration += length;
         if (edit.mediaTime < 0) continue;
-        const double media = static_cast<double>(edit.mediaTime) * tick + delay;
         const double slack = halfTick(edited.tick, media);
         // The picture under way when the edit begins, and those that begin in it.
         const auto begun =
@@ -105,10 +126,11 @@ Presentation presentationOf(const ElementaryStream& stream) {
 }
 
 double mediaTimeOf(const Node& texture, double duration, double now, double slack) {
-    const auto run = runOfMovie(texture, duration);
+    const Run shown = shownRun(texture, now + slack);
+    const auto run = clockOf(shown, duration);
     if (!run) return 0;
     const double speed = duration / run->cycle;
-    const bool backwards = runsBackwards(texture);
+    const bool backwards = shown.speed < 0;
     if (now < run->start) return backwards ? duration : 0;
     const double ended = run->end - run->start;
     double passed = std::min(now - run->start, ended);
@@ -119,15 +141,12 @@ double mediaTimeOf(const Node& texture, double duration, double now, double slac
     return backwards ? duration - passed * speed : passed * speed;
 }
 
-bool runsBackwards(const Node& texture) {
-    return runOf(texture).speed < 0;
+bool runsBackwards(const Node& texture, double now) {
+    return shownRun(texture, now).speed < 0;
 }
 
 std::optional<ClockRun> runOfMovie(const Node& texture, double duration) {
-    const Run run = runOf(texture);
-    const double cycle = duration / std::abs(run.speed);
-    if (run.speed == 0 || !(cycle > 0)) return {};
-    return ClockRun(run.start, cycle, run.stop, run.loopsUntil);
+    return clockOf(runOf(texture), duration);
 }
 
 bool addChanges(const Node& texture, const Presentation& stream, double from, double until,
@@ -136,15 +155,20 @@ bool addChanges(const Node& texture, const Presentation& stream, double from, do
     if (!run || stream.shown.size() < 2) return true;
     const std::size_t count = stream.shown.size();
     const double speed = std::abs(runOf(texture).speed);
-    const bool backwards = runsBackwards(texture);
+    const bool backwards = runOf(texture).speed < 0;
     // Seconds of a cycle after which its picture `i` comes.
     const auto after = [&](std::size_t i) {
         if (!backwards) return stream.shown[i].time / speed;
         const std::size_t next = count - i;
         return (next < count ? stream.duration - stream.shown[next].time : 0) / speed;
     };
-    if (std::isfinite(run->end))
-        until = std::min(until, run->end - halfTick(stream.tick, run->end));
+    // A stop shows the picture that begins just then, on from there; no cycle begins there.
+    double pictures = until;
+    if (std::isfinite(run->end)) {
+        const double slack = halfTick(stream.tick, run->end);
+        if (run->end <= until) pictures = run->end + slack;
+        until = std::min(until, run->end - slack);
+    }
     from = std::max(from, 0.0);
     for (double cycle = std::max(0.0, std::floor((from - run->start) / run->cycle));; ++cycle) {
         const double start = run->start + cycle * run->cycle;
@@ -153,9 +177,9 @@ bool addChanges(const Node& texture, const Presentation& stream, double from, do
         std::size_t i = 0;
         for (std::size_t step = std::bit_ceil(count); step > 0; step /= 2)
             if (i + step <= count && start + after(i + step - 1) < from) i += step;
-        // The first picture is shown from where the cycle begins.
-        if (cycle > 0 && start >= from) times.push_back(start);
-        for (; i < count && start + after(i) < until && after(i) < run->cycle; ++i) {
+        // The first picture is shown from where the cycle begins, in the place of another.
+        if ((cycle > 0 || texture.ended) && start >= from) times.push_back(start);
+        for (; i < count && start + after(i) < pictures && after(i) < run->cycle; ++i) {
             if (times.size() > kMostMoments) return false;
             times.push_back(start + after(i));
         }

@@ -44,25 +44,27 @@ struct Presentation {
 };
 /// The edit list counts from the first sample, and begins when that is decoded.
 /// Samples that the edit list leaves out are never shown; an edit list that leaves out all, or that
-/// shows more than kMostMoments pictures, is passed over.
+/// shows more than kMostMoments pictures, is passed over. A last edit of duration 0 shows all that
+/// is left (8.6.6).
 [[nodiscard]] Presentation presentationOf(const ElementaryStream& stream);
 
 /// The time of its stream that a texture shows at `now` seconds of the scene. A MovieTexture runs
 /// by startTime, stopTime, speed and loop, shows its first picture before it begins (its last when
-/// it runs backwards), and holds the last one when it has ended (ISO/IEC 14772-1, 6.28). Other
-/// textures run with the scene.
+/// it runs backwards), and holds the last one when it has ended (ISO/IEC 14772-1, 6.28), also
+/// while an event prepares its next run. Other textures run with the scene.
 /// A cycle that ends within `slack` seconds has ended.
 [[nodiscard]] double mediaTimeOf(const Node& texture, double duration, double now, double slack);
 
-/// Whether a texture plays its stream from its end. Its time at a moment is where the picture ends
-/// that is shown then, so that what is shown from then on is the one before.
-[[nodiscard]] bool runsBackwards(const Node& texture);
+/// Whether what a texture shows at `now` was played from its stream's end. Its time at a moment is
+/// where the picture ends that is shown then, so that what is shown from then on is the one before.
+[[nodiscard]] bool runsBackwards(const Node& texture, double now);
 
 /// When a texture of a stream of `duration` seconds is active; nothing where its picture stays.
 [[nodiscard]] std::optional<ClockRun> runOfMovie(const Node& texture, double duration);
 
 /// Adds the moments of the scene, from `from` and before `until`, at which a texture of a stream
-/// changes; seconds, ascending. False when there are more than kMostMoments.
+/// changes; seconds, ascending. One that stops just when a picture begins changes then, at `until`,
+/// too. False when there are more than kMostMoments.
 [[nodiscard]] bool addChanges(const Node& texture, const Presentation& stream, double from,
                               double until, std::vector<double>& times);
 

@@ -94,15 +94,20 @@ void StreamImages::setTime(double now, double slack) {
     const auto ticks = ticksBegun(now, document_->odStream.timescale, slack);
     if (!begun_ || ticks < odTicks_) {
         byId_.clear();
+        removed_.clear();
         for (const ObjectDescriptor* od : document_->objectDescriptors()) byId_[od->id] = od;
         nextOd_ = 0;
         begun_ = true;
     }
     odTicks_ = ticks;
     for (; nextOd_ < odOrder_.size() && frames[odOrder_[nextOd_]].time <= ticks; ++nextOd_)
-        for (const OdCommand& command : frames[odOrder_[nextOd_]].commands)
+        for (const OdCommand& command : frames[odOrder_[nextOd_]].commands) {
             if (const auto* update = std::get_if<UpdateObjectDescriptors>(&command))
                 for (const ObjectDescriptor& od : update->descriptors) byId_[od.id] = &od;
+            if (const auto* removal = std::get_if<RemoveObjectDescriptors>(&command))
+                for (const int id : removal->ids)
+                    if (byId_.erase(id) > 0) removed_.insert(id);
+        }
 }
 
 const Presentation& StreamImages::presentation(const ElementaryStream& stream) const {
@@ -117,7 +122,7 @@ std::size_t StreamImages::sampleAt(const Node& texture, const ElementaryStream& 
     const Presentation& shown = found->second;
     const double slack = std::max(slack_, halfTick(shown.tick, now_));
     return shown.sampleAt(mediaTimeOf(texture, shown.duration, now_, slack),
-                          runsBackwards(texture) ? -slack : slack);
+                          runsBackwards(texture, now_ + slack) ? -slack : slack);
 }
 
 const ElementaryStream* StreamImages::stream(const Node& texture) const {
@@ -151,6 +156,11 @@ Result<StreamImages::Source> StreamImages::sourceOf(const Node& texture) const {
 
 Result<const ElementaryStream*> StreamImages::streamOf(const Url& url) const {
     const auto found = byId_.find(url.objectDescriptorId);
+    if (found == byId_.end() && removed_.contains(url.objectDescriptorId))
+        return fail(ErrorCode::invalidInput,
+                    "object descriptor {} is named, which a command has removed before; name "
+                    "another, or remove it when nothing shows it",
+                    url.objectDescriptorId);
     if (found == byId_.end())
         return fail(ErrorCode::invalidInput,
                     "object descriptor {} is named, which the presentation does not have",

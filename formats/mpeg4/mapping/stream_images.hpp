@@ -5,6 +5,7 @@
 #include <mutex>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/mapping/media_clock.hpp"
@@ -87,6 +88,7 @@ class StreamImages {
     std::shared_ptr<PictureCache> cache_;
     std::shared_ptr<StreamVideo> video_ = std::make_shared<StreamVideo>();
     std::unordered_map<int, const ObjectDescriptor*> byId_;
+    std::unordered_set<int> removed_;   ///< by commands until then; some may be in byId_ again
     std::vector<std::size_t> odOrder_;  ///< of the document's frames of descriptors, by time
     std::size_t nextOd_ = 0;            ///< in that order: the first that is not in byId_
     std::uint64_t odTicks_ = 0;         ///< of byId_

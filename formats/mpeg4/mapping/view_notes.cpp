@@ -1,9 +1,11 @@
 #include "formats/mpeg4/mapping/view_notes.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "formats/files/base64.hpp"
 #include "formats/images/images.hpp"
+#include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 
 namespace stx::mpeg4 {
@@ -38,6 +40,8 @@ std::vector<double> numbers(std::string_view text, std::size_t count) {
 
 ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
     ViewNotes notes;
+    // Anybody may write "start 2" there, and mean something else.
+    if (std::ranges::find(info, kMadeByUs) == info.end()) return notes;
     for (const std::string& line : info) {
         if (line.starts_with("bounds ")) {
             const auto n = numbers(line, 6);

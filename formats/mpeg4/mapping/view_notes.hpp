@@ -66,7 +66,8 @@ struct ViewNotes {
         return fmt::format("#{}", number);
     }
 
-    /// Strings that are not ours, or do not parse, are passed over.
+    /// Strings that do not parse are passed over, and so are all of a WorldInfo that has no
+    /// kMadeByUs among them: they are not ours.
     [[nodiscard]] static ViewNotes parse(const std::vector<std::string>& info);
     [[nodiscard]] std::vector<std::string> text() const;
 };

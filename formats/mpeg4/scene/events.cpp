@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "formats/mpeg4/scene/interpolators.hpp"
 #include "lib/geometry/camera.hpp"
 
 namespace stx::mpeg4 {
@@ -64,7 +65,44 @@ std::string nameOf(const NodePtr& node, int field) {
     return field >= 0 && field < static_cast<int>(fields.size()) ? fields[field].name : "";
 }
 
+/// A movie that has ended shows its last picture on, whatever else it shall do when it starts anew
+/// (ISO/IEC 14772-1, 6.28).
+void keepEndedRun(Node& node, int field, double now, const ActiveNode& active) {
+    const std::string& name = node.info->fields[field].name;
+    if (!active || node.proto || !node.is("MovieTexture") ||
+        (name != "startTime" && name != "stopTime" && name != "speed" && name != "loop"))
+        return;
+    if (active(node, now)) {
+        node.ended.reset();
+        return;
+    }
+    const Node::EndedRun run{node.get<double>("startTime"), node.get<double>("stopTime"),
+                             node.get<float>("speed"), loopsUntil(node)};
+    const bool hasRun = run.start <= now && run.speed != 0;
+    // What events since have made of its fields did not run.
+    const bool isKept = node.ended && node.ended->start == run.start && run.loopsUntil != kEver;
+    if (hasRun && !isKept) node.ended = run;
+}
+
 }  // namespace
+
+bool isHeldWhileActive(const NodeInfo& node, int field) {
+    if (field < 0 || field >= static_cast<int>(node.fields.size())) return false;
+    const std::string& name = node.fields[field].name;
+    return name == "startTime" || name == "cycleInterval" || name == "speed";
+}
+
+bool isHeld(const Node& node, int field, double now, const ActiveNode& active) {
+    return isHeldWhileActive(*node.info, field) && active && active(node, now);
+}
+
+bool giveEvent(Node& node, int field, const FieldValue& value, double now,
+               const ActiveNode& active) {
+    if (typeOf(node.value(field)) == typeOf(value)) keepEndedRun(node, field, now, active);
+    const bool* loops = std::get_if<bool>(&node.value(field));
+    if (loops && *loops && isLoop(node, field)) node.loopedUntil = now;
+    return node.set(field, value);
+}
 
 bool isInterpolator(const Node& node) {
     return interpolationOf(node) != nullptr;

@@ -27,6 +27,18 @@ namespace stx::mpeg4 {
 /// Whether a route ends in a field that keeps a value of those that are sent here.
 [[nodiscard]] bool keepsValue(const Route& route);
 
+/// Whether a field takes no event while its node is active.
+[[nodiscard]] bool isHeldWhileActive(const NodeInfo& node, int field);
+
+/// Whether a field takes no event now, since its node is active (ISO/IEC 14772-1, 6.28 and 6.50).
+/// `active` may be empty: nothing is active then.
+[[nodiscard]] bool isHeld(const Node& node, int field, double now, const ActiveNode& active);
+
+/// Gives a field a value that comes to it as an event at `now` seconds of the scene, and keeps in
+/// the node what its earlier value means for what is shown then. False where it takes none.
+[[nodiscard]] bool giveEvent(Node& node, int field, const FieldValue& value, double now,
+                             const ActiveNode& active);
+
 /// A route or a part of one, as `TYPE.event TO TYPE.field`.
 [[nodiscard]] std::string textOf(const Route& route);
 

@@ -14,12 +14,17 @@ namespace {
 /// What the clocks of a scene send along its routes.
 class ClockEvents {
   public:
-    explicit ClockEvents(Scene& scene)
+    ClockEvents(Scene& scene, const ActiveNode& active)
         : clocks_(clocksOf(scene)),
-          events_(scene, [&scene](const NodePtr& node, int field, const FieldValue& value) {
+          active_(active),
+          events_(scene, [this, &scene](const NodePtr& node, int field, const FieldValue& value) {
+              if (isHeld(*node, field, now_, active_)) return false;
               scene.changed.insert(node.get());
-              return node->set(field, value);
+              return giveEvent(*node, field, value, now_, active_);
           }) {}
+    // The events call back.
+    ClockEvents(const ClockEvents&) = delete;
+    ClockEvents& operator=(const ClockEvents&) = delete;
 
     /// What the clocks send after `before` and until `now`, in the order of its times; of each
     /// clock the last. Whether there was any.
@@ -34,6 +39,7 @@ class ClockEvents {
         std::ranges::stable_sort(events, {}, [](const auto& event) { return event.first; });
         for (std::size_t i = 0; i < events.size(); ++i) {
             if (i == 0 || events[i].first > events[i - 1].first) events_.nextStamp();
+            now_ = events[i].first;
             if (const auto fraction = fractionOf(**events[i].second, events[i].first, slack))
                 events_.send(*events[i].second, "fraction_changed", FieldValue(*fraction));
         }
@@ -42,6 +48,8 @@ class ClockEvents {
 
   private:
     std::vector<NodePtr> clocks_;
+    ActiveNode active_;
+    double now_ = 0;  ///< of the event that is sent
     Events events_;
 };
 
@@ -118,12 +126,13 @@ std::set<std::string> routesNotFollowed(const Scene& scene) {
 }
 
 void applyInterpolators(Scene& scene, double now) {
-    ClockEvents(scene).run(-kEver, now, 0);
+    ClockEvents(scene, {}).run(-kEver, now, 0);
 }
 
 struct MovingScene::Impl {
     SceneInTime moments;
     std::uint32_t timescale;
+    ActiveNode active;
     std::optional<ClockEvents> events;
     std::uint64_t routes = 0;  ///< SceneInTime::Structure::routes that the events are of
     double before = 0;         ///< of which the scene is
@@ -134,7 +143,7 @@ struct MovingScene::Impl {
         auto scene = moments.at(until);
         if (!scene || !events || routes != moments.structure().routes) {
             events.reset();
-            if (scene) events.emplace(**scene);
+            if (scene) events.emplace(**scene, active);
             routes = moments.structure().routes;
         }
         return scene;
@@ -144,7 +153,7 @@ struct MovingScene::Impl {
 MovingScene::MovingScene(const std::vector<CommandFrame>& frames, std::uint32_t timescale,
                          bool timesFromStart, ActiveNode active)
     : impl_(new Impl{
-          SceneInTime(frames, timescale, timesFromStart, std::move(active)), timescale, {}}) {}
+          SceneInTime(frames, timescale, timesFromStart, active), timescale, active, {}}) {}
 MovingScene::MovingScene(MovingScene&&) noexcept = default;
 MovingScene& MovingScene::operator=(MovingScene&&) noexcept = default;
 MovingScene::~MovingScene() = default;

@@ -158,6 +158,15 @@ struct Node : std::enable_shared_from_this<Node> {
     std::string defName;  ///< DEF name of the text forms and of BIFS with USENAMES; may be empty
     /// Of a scene in time. When a command has last ended that the node loops, in seconds.
     double loopedUntil = -std::numeric_limits<double>::infinity();
+    /// How a MovieTexture ran last.
+    struct EndedRun {
+        double start = 0, stop = 0;
+        float speed = 1;
+        double loopsUntil = 0;
+    };
+    /// Of a scene in time, when an event has changed a MovieTexture that had ended: what it shows
+    /// until it starts anew.
+    std::optional<EndedRun> ended;
     /// Of an instance in a scene in time: what the times in its body count from, in seconds.
     double begin = 0;
 

@@ -10,13 +10,6 @@
 namespace stx::mpeg4 {
 namespace {
 
-/// Whether a field takes no event while its node is active (ISO/IEC 14772-1, 6.28 and 6.50).
-bool isHeldWhileActive(const NodeInfo& node, int field) {
-    if (field < 0 || field >= static_cast<int>(node.fields.size())) return false;
-    const std::string& name = node.fields[field].name;
-    return name == "startTime" || name == "cycleInterval" || name == "speed";
-}
-
 bool isNodes(const FieldValue& value) {
     return std::holds_alternative<NodePtr>(value) || std::holds_alternative<NodeList>(value);
 }
@@ -248,17 +241,14 @@ class Composer {
 
     /// Gives a field a value that comes to it as an event. False where it takes none.
     bool give(const NodePtr& node, int field, const FieldValue& value) {
-        const bool* loops = std::get_if<bool>(&node->value(field));
-        if (loops && *loops && isLoop(*node, field)) node->loopedUntil = now_;
-        if (!node->set(field, value)) return false;
+        if (!giveEvent(*node, field, value, now_, active_)) return false;
         scene_.changed.insert(node.get());
         // The copies of its body are others then.
         if (isNodes(value) || (node->proto && isOfMedia(*node, field))) noteNodes(true);
         return true;
     }
     bool giveByRoute(const NodePtr& node, int field, const FieldValue& value) {
-        if (isHeldWhileActive(*node->info, field) && active_ && active_(*node, now_)) return false;
-        return give(node, field, value);
+        return !isHeld(*node, field, now_, active_) && give(node, field, value);
     }
     /// Follows the routes of an event that a command makes: `send` tells how many there were.
     template <class Send>

@@ -4,6 +4,99 @@
 
 namespace stx::mpeg4 {
 
+namespace {
+
+/// Elements that hold commands of one time.
+bool isTimed(std::string_view type) {
+    return type == "par" || type == "seq";
+}
+bool isSceneCommand(std::string_view type) {
+    return type == "Replace" || type == "Insert" || type == "Delete";
+}
+
+/// The attributes of an element of the body. atES_ID names a stream: those of a scene are one here.
+std::vector<std::string_view> commandAttributes(std::string_view type, bool inBuffer) {
+    std::vector<std::string_view> names;
+    // What is in a buffer acts when the buffer is played.
+    if (!inBuffer) names = {"begin", "isRAP", "atES_ID"};
+    if (isSceneCommand(type))
+        names.insert(names.end(), {"atNode", "atField", "atRoute", "position", "value"});
+    if (type == "ObjectDescriptorRemove") names.emplace_back("objectDescriptorID");
+    return names;
+}
+
+}  // namespace
+
+Result<void> XmtReader::checkCommandAttributes(xml_node node) const {
+    const auto known = commandAttributes(localName(node), bufferDepth_ > 0);
+    for (const auto attribute : node.attributes()) {
+        const std::string_view own = attribute.name();
+        if (own == "xmlns" || own.find(':') != std::string_view::npos) continue;
+        const bool isKnown = std::ranges::any_of(known, [&](std::string_view one) {
+            // Some write objectDescriptorId.
+            return own == one || (one == "objectDescriptorID" && equalNoCase(own, one));
+        });
+        if (!isKnown)
+            return failAt(where(node), ErrorCode::invalidInput,
+                          "<{}> has no attribute '{}'; it has {}", localName(node), excerpt(own),
+                          fmt::join(known, ", "));
+    }
+    return {};
+}
+
+Result<double> XmtReader::timeOf(xml_node node, double seconds) const {
+    const auto attribute = node.attribute("begin");
+    if (attribute.empty()) return seconds;
+    const auto begin = doubleFromText(attribute.value());
+    // A command that has a time of its own does not count from its par (as GPAC reads it).
+    const double from = isTimed(localName(node)) ? seconds : 0;
+    if (!begin || !(*begin >= 0) || *begin > 1e9 || from + *begin > 1e9)
+        return failAt(where(node), ErrorCode::invalidInput,
+                      "begin is '{}', expected a time of 0 or more seconds",
+                      excerpt(attribute.value()));
+    return from + *begin;
+}
+
+Result<void> XmtReader::readCommands(xml_node parent, double seconds, int depth) {
+    STX_CHECK(checkDepth(parent, depth));
+    for (const xml_node node : elements(parent)) {
+        const std::string_view type = localName(node);
+        if (bufferDepth_ > 0 && !isSceneCommand(type))
+            return unexpectedElement(node, "Replace, Insert or Delete in a buffer");
+        if (!isTimed(type) && !isSceneCommand(type) && type != "ObjectDescriptorUpdate" &&
+            type != "ObjectDescriptorRemove")
+            return unexpectedElement(node,
+                                     "Replace, Insert, Delete, ObjectDescriptorUpdate, "
+                                     "ObjectDescriptorRemove or par");
+        STX_CHECK(checkCommandAttributes(node));
+        STX_TRY(const double begin, timeOf(node, seconds));
+        const auto ticks = [&](std::uint32_t timescale) {
+            return static_cast<std::uint64_t>(std::llround(begin * timescale));
+        };
+        const std::uint64_t sceneTime = ticks(document_.sceneStream.timescale);
+        const std::uint64_t odTime = ticks(document_.odStream.timescale);
+        const bool begins = equalNoCase(node.attribute("isRAP").as_string(), "yes");
+        const std::size_t sceneBefore = begins ? commandsAt(document_.frames, sceneTime) : 0;
+        const std::size_t odBefore = begins ? commandsAt(document_.odFrames, odTime) : 0;
+        if (isTimed(type)) {
+            STX_CHECK(readCommands(node, begin, depth + 1));
+        } else if (type == "ObjectDescriptorUpdate") {
+            STX_CHECK(readOdUpdate(node, odTime));
+        } else if (type == "ObjectDescriptorRemove") {
+            STX_CHECK(readOdRemove(node, odTime));
+        } else {
+            inCommand_ = !document_.frames.empty();
+            STX_CHECK(readCommand(node, type, sceneTime));
+        }
+        if (!begins) continue;
+        if (commandsAt(document_.frames, sceneTime) > sceneBefore)
+            markRandomAccess(document_.frames, sceneTime);
+        if (commandsAt(document_.odFrames, odTime) > odBefore)
+            markRandomAccess(document_.odFrames, odTime);
+    }
+    return {};
+}
+
 Result<std::optional<Position>> XmtReader::positionOf(xml_node node, std::string_view text) const {
     if (equalNoCase(text, "END") || equalNoCase(text, "LAST")) return std::optional(Position());
     if (equalNoCase(text, "BEGIN") || equalNoCase(text, "FIRST")) return std::optional(Position{0});

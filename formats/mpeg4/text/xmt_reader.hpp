@@ -167,48 +167,12 @@ class XmtReader : private TextReader {
     }
 
     // ---- Commands
-    Result<void> readCommands(xml_node parent, double seconds, int depth) {
-        STX_CHECK(checkDepth(parent, depth));
-        for (const xml_node node : elements(parent)) {
-            const std::string_view type = localName(node);
-            if (bufferDepth_ > 0 && type != "Replace" && type != "Insert" && type != "Delete")
-                return unexpectedElement(node, "Replace, Insert or Delete in a buffer");
-            const auto ticks = [&](std::uint32_t timescale) {
-                return static_cast<std::uint64_t>(std::llround(seconds * timescale));
-            };
-            if (type == "par" || type == "seq") {
-                const auto begin = doubleFromText(node.attribute("begin").as_string("0"));
-                if (!begin || !(*begin >= 0) || *begin > 1e9 || seconds + *begin > 1e9)
-                    return failAt(where(node), ErrorCode::invalidInput,
-                                  "begin is '{}', expected a time of 0 or more seconds",
-                                  excerpt(node.attribute("begin").value()));
-                const auto sceneTime = static_cast<std::uint64_t>(
-                    std::llround((seconds + *begin) * document_.sceneStream.timescale));
-                const auto odTime = static_cast<std::uint64_t>(
-                    std::llround((seconds + *begin) * document_.odStream.timescale));
-                const std::size_t sceneBefore = commandsAt(document_.frames, sceneTime);
-                const std::size_t odBefore = commandsAt(document_.odFrames, odTime);
-                STX_CHECK(readCommands(node, seconds + *begin, depth + 1));
-                if (!equalNoCase(node.attribute("isRAP").as_string(), "yes")) continue;
-                if (commandsAt(document_.frames, sceneTime) > sceneBefore)
-                    markRandomAccess(document_.frames, sceneTime);
-                if (commandsAt(document_.odFrames, odTime) > odBefore)
-                    markRandomAccess(document_.odFrames, odTime);
-            } else if (type == "ObjectDescriptorUpdate") {
-                STX_CHECK(readOdUpdate(node, ticks(document_.odStream.timescale)));
-            } else if (type == "ObjectDescriptorRemove") {
-                STX_CHECK(readOdRemove(node, ticks(document_.odStream.timescale)));
-            } else if (type == "Replace" || type == "Insert" || type == "Delete") {
-                inCommand_ = !document_.frames.empty();
-                STX_CHECK(readCommand(node, type, ticks(document_.sceneStream.timescale)));
-            } else {
-                return unexpectedElement(node,
-                                         "Replace, Insert, Delete, ObjectDescriptorUpdate, "
-                                         "ObjectDescriptorRemove or par");
-            }
-        }
-        return {};
-    }
+    /// Errors (invalidInput): an attribute of a command, par or seq that it does not have.
+    Result<void> checkCommandAttributes(xml_node node) const;
+    /// When what is in an element acts, in seconds; `seconds` is the time of its parent.
+    Result<double> timeOf(xml_node node, double seconds) const;
+    /// The commands in an element whose time is `seconds`.
+    Result<void> readCommands(xml_node parent, double seconds, int depth);
 
     Result<Route> readRoute(xml_node node) {
         Route route;

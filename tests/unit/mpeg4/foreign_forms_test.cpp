@@ -146,6 +146,54 @@ TEST(XmtDescriptors, OfTheStartAreAPlaceToBegin) {
     EXPECT_FALSE(back.odFrames[0].randomAccess);
 }
 
+Result<Document> readXmtBody(const std::string& commands) {
+    Job job;
+    return readXmt(
+        "<XMT-A><Header/><Body><Replace><Scene><Group DEF=\"G\"><children><PointLight "
+        "DEF=\"L\"/></children></Group></Scene></Replace>" +
+            commands + "</Body></XMT-A>",
+        "a.xmt", job);
+}
+
+TEST(XmtCommands, MayHaveATimeOfTheirOwn) {
+    const auto document = readXmtBody(R"(
+<Replace begin="7" isRAP="yes" atNode="L" atField="on" value="false"/>
+<par begin="1"><Replace atNode="L" atField="on" value="true"/>
+ <Delete begin="2.5" atNode="L"/><Insert begin="0.5" atNode="G"><Group/></Insert>
+ <par begin="3"><ObjectDescriptorRemove begin="6" objectDescriptorId="10"/></par></par>
+)");
+    ASSERT_TRUE(document) << document.error().text();
+    std::vector<std::uint64_t> times;
+    for (const CommandFrame& frame : document->frames) times.push_back(frame.time);
+    std::ranges::sort(times);
+    EXPECT_EQ(times, (std::vector<std::uint64_t>{0, 500, 1000, 2500, 7000}));
+    for (const CommandFrame& frame : document->frames)
+        EXPECT_EQ(frame.randomAccess, frame.time == 7000) << frame.time;
+    ASSERT_EQ(document->odFrames.size(), 1u);
+    EXPECT_EQ(document->odFrames[0].time, 6000u);
+}
+
+TEST(XmtCommands, RefuseWhatTheyDoNotHave) {
+    const auto errorOfBody = [](const std::string& commands) {
+        const auto document = readXmtBody(commands);
+        return document ? std::string("no error") : document.error().text();
+    };
+    const std::string light = R"(<Replace atNode="L" atField="on" value="false")";
+    EXPECT_TRUE(holdsText(errorOfBody(light + R"( begin="-1"/>)"),
+                          "begin is '-1', expected a time of 0 or more seconds"));
+    EXPECT_TRUE(holdsText(errorOfBody(light + R"( begin="2000000000"/>)"),
+                          "begin is '2000000000', expected a time of 0 or more seconds"));
+    EXPECT_TRUE(holdsText(errorOfBody(light + R"( begn="1"/>)"),
+                          "<Replace> has no attribute 'begn'; it has begin, isRAP, atES_ID, "
+                          "atNode, atField, atRoute, position, value"));
+    EXPECT_TRUE(holdsText(errorOfBody("<par begn=\"1\">" + light + "/></par>"),
+                          "<par> has no attribute 'begn'; it has begin, isRAP, atES_ID"));
+    EXPECT_TRUE(holdsText(errorOfBody(R"(<ObjectDescriptorRemove id="1"/>)"),
+                          "<ObjectDescriptorRemove> has no attribute 'id'"));
+    // Those of other schemas are left alone.
+    EXPECT_EQ(errorOfBody(light + R"( xmlns:a="u" a:note="x"/>)"), "no error");
+}
+
 TEST(LaterTimes, CountFromTheirAccessUnit) {
     const Document document = mustReadBt(R"(
 DEF A Group { children [ DEF T TimeSensor { startTime 1 stopTime 3 cycleInterval 4 } ] }

@@ -5,7 +5,7 @@
 namespace stx::mpeg4 {
 namespace {
 
-const std::string kBounds = "WorldInfo { info [\"bounds 1 0 0 2 1 0.5\"] } ";
+const std::string kBounds = "WorldInfo { info [\"made by stx\" \"bounds 1 0 0 2 1 0.5\"] } ";
 /// Of a depthImage(kSeesBounds) that has them between its planes.
 const std::string kSeesBounds = "position 1.5 0.5 9";
 
@@ -99,8 +99,8 @@ TEST(StatedBounds, AreNotBelievedWhereViewsWereMovedWithoutThem) {
 }
 
 std::string withOrigin(const std::string& origin, const std::string& more = "") {
-    return "Group { children [ WorldInfo { info [\"origin " + origin + "\" " + more + "] } " +
-           depthImage(kSeesBounds) + " ] } ";
+    return "Group { children [ WorldInfo { info [\"made by stx\" \"origin " + origin + "\" " +
+           more + "] } " + depthImage(kSeesBounds) + " ] } ";
 }
 
 TEST(StatedOrigins, FollowTheTransformsAboveThem) {

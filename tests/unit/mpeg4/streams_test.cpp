@@ -226,6 +226,42 @@ TEST(Streams, EditsThatAreNoDelayAreKept) {
     expectStreamsKept(read);
 }
 
+TEST(Streams, EditsOfTheSceneAreInTheTimesOfItsCommands) {
+    Document document = smallScene();
+    const NodePtr root = std::get<ReplaceScene>(document.frames[0].commands[0]).root;
+    for (const std::uint64_t time : {1000u, 2000u})
+        document.frames.push_back({time, {InsertNode{root, {}, makeNode("Viewpoint")}}});
+    document.odFrames.push_back({1000, {RemoveObjectDescriptors{{21}}}});
+    const auto timesWith = [&](const std::vector<Edit>& edits, std::size_t notes) {
+        document.sceneStream.edits = document.odStream.edits = {1000, edits};
+        Job job;
+        const auto bytes = writeMp4(document, job, {});
+        EXPECT_TRUE(bytes) << bytes.error().text();
+        const auto read = readMp4(ByteSource::fromBytes(*bytes), job);
+        EXPECT_TRUE(read) << read.error().text();
+        std::vector<std::uint64_t> times;
+        for (const CommandFrame& frame : read->frames) times.push_back(frame.time);
+        for (const OdFrame& frame : read->odFrames) times.push_back(frame.time);
+        EXPECT_EQ(read->sceneStream.edits.edits.empty(), notes == 0);
+        const auto said = job.takeNotes();
+        EXPECT_EQ(said.size(), notes) << fmt::format("{}", fmt::join(said, "\n"));
+        return times;
+    };
+    using Times = std::vector<std::uint64_t>;
+    const Times plain = {0, 1000, 2000, 0, 1000};
+    EXPECT_EQ(timesWith({{500, -1, 0x10000}, {9000, 0, 0x10000}}, 0),
+              (Times{500, 1500, 2500, 500, 1500}));
+    // What comes before an edit has happened when it begins.
+    EXPECT_EQ(timesWith({{9000, 1000, 0x10000}}, 0), (Times{0, 0, 1000, 0, 0}));
+    EXPECT_EQ(timesWith({{0, 1000, 0x10000}}, 0), (Times{0, 0, 1000, 0, 0}));
+    EXPECT_EQ(timesWith({{500, -1, 0x10000}, {9000, 1000, 0x10000}}, 0),
+              (Times{500, 500, 1500, 500, 500}));
+    // In another order, at another speed, or without a command.
+    EXPECT_EQ(timesWith({{1000, 2000, 0x10000}, {9000, 0, 0x10000}}, 2), plain);
+    EXPECT_EQ(timesWith({{9000, 0, 0x8000}}, 2), plain);
+    EXPECT_EQ(timesWith({{600, 0, 0x10000}}, 2), plain);
+}
+
 TEST(Streams, OnlyPlacesToBeginAreSyncSamples) {
     Document document = smallScene();
     const NodePtr root = std::get<ReplaceScene>(document.frames[0].commands[0]).root;

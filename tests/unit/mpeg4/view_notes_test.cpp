@@ -101,11 +101,29 @@ TEST(ViewNotes, ThatMeanNoViewAreTold) {
     ASSERT_EQ(notes.size(), 1u);
     EXPECT_NE(notes[0].find("of 5 view(s)"), std::string::npos) << notes[0];
 
-    written.info->set("info", std::vector<std::string>{"background gone 0"});
+    written.info->set("info", std::vector<std::string>{kMadeByUs, "background gone 0"});
     ASSERT_TRUE(bundleFromScene(written.document, {}, job));
     notes = job.takeNotes();
     ASSERT_EQ(notes.size(), 1u);
     EXPECT_NE(notes[0].find("'gone'"), std::string::npos) << notes[0];
+}
+
+// A museum may write "start 2" about its opening hours.
+TEST(ViewNotes, OfOthersAreWords) {
+    const std::vector<std::string> words{"start 2",        "duration 3",    "origin 5 5 5",
+                                         "views 1",        "name #0 other", "bounds 0 0 0 1 1 1",
+                                         "pruned #0 0 all"};
+    const ViewNotes theirs = ViewNotes::parse(words);
+    EXPECT_FALSE(theirs.start || theirs.duration || theirs.origin || theirs.bounds || theirs.count);
+    EXPECT_TRUE(theirs.views.empty());
+    // Others may have added words of their own to ours.
+    for (const bool front : {true, false}) {
+        std::vector<std::string> ours = words;
+        ours.insert(front ? ours.begin() : ours.end(), kMadeByUs);
+        EXPECT_EQ(ViewNotes::parse(ours).start, 2.0);
+        EXPECT_EQ(ViewNotes::parse(ours).origin, glm::dvec3(5));
+        EXPECT_EQ(ViewNotes::parse(ours).views.size(), 1u);
+    }
 }
 
 }  // namespace

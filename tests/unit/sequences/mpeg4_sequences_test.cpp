@@ -169,6 +169,28 @@ TEST(Mpeg4Sequences, WhatCannotMoveIsSaid) {
     EXPECT_EQ(one.error().code, ErrorCode::usage);
 }
 
+TEST(ExrSequences, FilesOfAFilmHaveTheSameViews) {
+    class Shrinks : public MovingViews {
+      public:
+        using MovingViews::MovingViews;
+        Result<Bundle> frame(std::size_t index, Job& job) override {
+            auto bundle = MovingViews::frame(index, job);
+            if (index == 2) bundle->views.pop_back();
+            return bundle;
+        }
+    };
+    TemporaryFolder folder("sequences");
+    Job job;
+    Shrinks frames(4);
+    const auto saved = saveSequence(frames, folder / "a_%03d.exr", {}, job);
+    ASSERT_FALSE(saved);
+    EXPECT_EQ(saved.error().code, ErrorCode::invalidInput);
+    EXPECT_EQ(saved.error().text(),
+              "frame 2 (0.08 s): 1 view at 0.08 s, but 2 at the start; the files of a film have "
+              "the same views; stx render and stx extract take one whose views change");
+    EXPECT_FALSE(std::filesystem::exists(folder / "a_000.exr"));
+}
+
 namespace {
 
 /// Two frames at times of its own.
@@ -336,6 +358,24 @@ TEST(MediaClock, ADelayIsOneOfTheEditsToo) {
     EXPECT_EQ(shown.sampleAt(1.04, kSlack), 2u);
     EXPECT_EQ(shown.sampleAt(1.08, kSlack), 1u);
     EXPECT_NEAR(shown.duration, 1.12, 1e-9);
+}
+
+TEST(MediaClock, ALastEditWithoutADurationIsTheRest) {
+    // ISO/IEC 14496-12, 8.6.6.
+    ElementaryStream stream = streamOf({0, 40, 80, 120});
+    stream.edits = {1000, {{0, 80, 0x10000}}};
+    Presentation shown = presentationOf(stream);
+    ASSERT_EQ(shown.shown.size(), 2u);
+    EXPECT_EQ(shown.sampleAt(0, kSlack), 2u);
+    EXPECT_EQ(shown.sampleAt(0.04, kSlack), 3u);
+    EXPECT_NEAR(shown.duration, 0.08, 1e-9);
+    // Behind a delay, and behind another edit.
+    stream.edits = {1000, {{100, -1, 0x10000}, {40, 0, 0x10000}, {0, 120, 0x10000}}};
+    shown = presentationOf(stream);
+    ASSERT_EQ(shown.shown.size(), 2u);
+    EXPECT_EQ(shown.sampleAt(0.1, kSlack), 0u);
+    EXPECT_EQ(shown.sampleAt(0.14, kSlack), 3u);
+    EXPECT_NEAR(shown.duration, 0.18, 1e-9);
 }
 
 TEST(MediaClock, ShortListsDoNotBecomeLongOnes) {

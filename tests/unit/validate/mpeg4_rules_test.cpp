@@ -435,7 +435,7 @@ TEST(Validate, MasksInWorldInfoAreDecoded) {
         rootOf(document)
             ->get<NodeList>("children")
             .at(0)
-            ->set("info", std::vector<std::string>{"unknown #0 0 " + mask});
+            ->set("info", std::vector<std::string>{mpeg4::kMadeByUs, "unknown #0 0 " + mask});
         return document;
     };
     EXPECT_EQ(numbersWith(noted("alpha"), true), Numbers{});
