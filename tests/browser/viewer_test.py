@@ -106,6 +106,9 @@ def models(test, browser, args):
     test.compare(browser, "amphora, from above", "amphora.html", "amphora.mp4", "0,3,0", "0,0.5,0")
     test.compare(browser, "amphora, near", "amphora.html", "amphora.mp4", "0.9,1.1,1.1", "0.1,0.7,0")
     test.compare(browser, "amphora, very near", "amphora.html", "amphora.mp4", "0.5,0.6,0.5", "-0.3,0.5,0.3", fov=80)
+    test.stx_run("convert", args.model, "-o", "few.mp4", "--views", "cube", "--size", "128x128")
+    test.stx_run("extract", "few.mp4", "-o", "few.html")
+    test.compare(browser, "amphora, near, of few small views", "few.html", "few.mp4", "0.2,0.6,0.8", "0,0.5,0")
 
 
 def coarse_views(test, browser, model):
