@@ -273,7 +273,7 @@ class Painter {
             gl.disable(gl.BLEND);
         }
         turn(this.silhouettes, {directionTexture: [colour, two], outlineTexture: [normal, two], coverTexture: [scene.cover, array], viewTable: [views.texture, two], viewCount: views.count,
-                                pixelSize: 1 / Math.min(camera.fx, camera.fy), carve});
+                                pixelSize: 1 / Math.min(camera.fx, camera.fy), carve, hasGlass: scene.hasGlass});
         gl.bindFramebuffer(gl.FRAMEBUFFER, null);
         gl.viewport(0, 0, novel.width, novel.height);
         gl.enable(gl.BLEND);

@@ -3,6 +3,7 @@
 const kBlock = 16, kTableRows = 1024, kEntry = 8;
 const kBlockColumns = 1024;  // of the texture of blocks
 const kSmoothDepths = 1.2;  // lib/render/splat/plan.cpp
+const kInside = 2, kGlassBorder = 4;  // texels: lib/model/translucent.cpp, lib/render/scene/glass_pages.cpp
 const kMostReach = 6;  // pixels that a point covers to each side in another view
 
 // A texture of numbers that shaders read with texelFetch.
@@ -17,7 +18,39 @@ function makeTexture(gl, target, internal, format, type, width, height, layers, 
     return texture;
 }
 
-// Alpha of a view beside what is within two pixels: 0 = all of it is empty, 255 = all is full, 128 = neither is so.
+// How much of each texel glass covers, 1..255: lib/render/scene/glass_pages.cpp. 0 elsewhere; null where nothing is glass.
+// Inside of glass texels are in part opaque for kInside texels around; it goes on for kGlassBorder around that.
+function glassCoverage(colour, depth) {
+    const {width, height} = depth, rgba = colour.values, count = width * height;
+    const inPart = (i) => rgba[4 * i + 3] > 0 && rgba[4 * i + 3] < 255;
+    const inside = new Uint8Array(count), side = 2 * kInside + 1;
+    const down = new Uint16Array(width);  // rows in which this texel has kInside such texels to both sides
+    for (let y = 0, i = 0; y < height; ++y) {
+        for (let x = 0, run = 0; x < width; ++x, ++i) {
+            run = inPart(i) && depth.values[i] !== 0 ? run + 1 : 0;
+            const at = x - kInside;
+            if (at < 0) continue;
+            down[at] = run >= side ? down[at] + 1 : 0;
+            if (down[at] >= side) inside[i - kInside - kInside * width] = 1;
+        }
+    }
+    if (!inside.includes(1)) return null;
+    const values = new Uint8Array(count);
+    for (let y = 0, i = 0; y < height; ++y) {
+        for (let x = 0; x < width; ++x, ++i) {
+            if (inside[i]) values[i] = 255;
+            if (inside[i] || !inPart(i)) continue;
+            let most = 0;
+            for (let v = Math.max(0, y - kGlassBorder); v <= Math.min(height - 1, y + kGlassBorder); ++v)
+                for (let u = Math.max(0, x - kGlassBorder); u <= Math.min(width - 1, x + kGlassBorder); ++u)
+                    if (inside[v * width + u]) most = Math.max(most, rgba[4 * (v * width + u) + 3]);
+            if (most > 0) values[i] = Math.max(1, Math.round(255 * Math.min(1, rgba[4 * i + 3] / most)));
+        }
+    }
+    return {width, height, channels: 1, values};
+}
+
+// Coverage of a view beside what is within two pixels: 0 = all of it is empty, 254 = all is full, 128 = neither is so.
 function withSurroundings(alpha, stride, width, height) {
     const count = alpha.length, both = new Uint8Array(2 * count);
     const full = new Uint8Array(count), some = new Uint8Array(count);  // within two pixels along the row
@@ -33,11 +66,24 @@ function withSurroundings(alpha, stride, width, height) {
     for (let y = 2; y + 2 < height; ++y) {
         for (let x = 2; x + 2 < width; ++x) {
             const i = y * stride + x, j = i - 2 * stride, k = i - stride, l = i + stride, m = i + 2 * stride;
-            if (full[i] & full[j] & full[k] & full[l] & full[m]) both[2 * i + 1] = 255;
+            if (full[i] & full[j] & full[k] & full[l] & full[m]) both[2 * i + 1] = 254;
             else if (!(some[i] | some[j] | some[k] | some[l] | some[m])) both[2 * i + 1] = 0;
         }
     }
     return both;
+}
+
+// Sets the lowest bit of what is around (withSurroundings()) where a view shows glass or has it beside that, two pixels
+// away along either axis or both: nearGlass() of lib/render/outline/silhouettes.cpp.
+function markNearGlass(both, glass, stride, width, height) {
+    for (let y = 0; y < height; ++y) {
+        for (let x = 0; x < width; ++x) {
+            if (!glass[y * stride + x]) continue;
+            for (const v of [y - 2, y, y + 2])
+                for (const u of [x - 2, x, x + 2])
+                    if (u >= 0 && v >= 0 && u < width && v < height) both[2 * (v * stride + u) + 1] |= 1;
+        }
+    }
 }
 
 // An image with room to the right and below, so that all textures of a scene are of one size.
@@ -86,6 +132,8 @@ class Scene {
         for (const page of pages) {
             if (page.alpha) page.alpha.values.forEach((a, i) => page.colour.values[4 * i + 3] = a);
             delete page.alpha;
+            const glass = glassCoverage(page.colour, page.depth);
+            if (glass) page.glass = glass;
         }
         const width = Math.max(...pages.map((p) => p.colour.width)), height = Math.max(...pages.map((p) => p.colour.height));
         for (const page of pages)
@@ -146,6 +194,8 @@ class Scene {
             return pages.map((p) => makeTexture(gl, gl.TEXTURE_2D, gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE, this.width,
                                                 this.height, 1, p[name].values));
         });
+        const glass = pages.map((p) => makeTexture(gl, gl.TEXTURE_2D, gl.R8, gl.RED, gl.UNSIGNED_BYTE, p.glass ? this.width : 1,
+                                                   p.glass ? this.height : 1, 1, p.glass && p.glass.values));
         program.use({colourTexture: [this.colour, gl.TEXTURE_2D_ARRAY], depthTexture: [this.depth, gl.TEXTURE_2D_ARRAY],
                      given: [pages[0].normal ? 1 : 0, pages[0].splat ? 1 : 0]});
         gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
@@ -163,7 +213,8 @@ class Scene {
             const free = [r.viewX, r.viewY, view.width - r.viewX - across, view.height - r.viewY - down];
             const around = (r.turned ? [free[3], free[0], free[1], free[2]] : free).map((n) => Math.min(n, padding, 2));
             const one = (k) => [given[k] instanceof Array ? given[k][r.page] : given[k], gl.TEXTURE_2D];
-            program.use({givenNormals: one(0), givenSplats: one(1), area: [r.x, r.y, r.width, r.height], around,
+            program.use({givenNormals: one(0), givenSplats: one(1), glassTexture: [glass[r.page], gl.TEXTURE_2D],
+                         hasGlass: Boolean(pages[r.page].glass), area: [r.x, r.y, r.width, r.height], around,
                          sourceLens: [c.fx, c.fy, c.cx, c.cy],
                          planes: [c.nearPlane, c.farPlane, c.dmax, c.orthographic ? 1 : 0],
                          worldFromSource: c.axes.flat(), layer: r.page});
@@ -171,7 +222,7 @@ class Scene {
         }
         gl.disable(gl.SCISSOR_TEST);
         gl.deleteFramebuffer(frame);
-        given.flat().forEach((t) => gl.deleteTexture(t));
+        [...given.flat(), ...glass].forEach((t) => gl.deleteTexture(t));
     }
 
     // Blocks of 16x16 texels that hold points, and points to measure the footprint of a pixel with.
@@ -231,7 +282,7 @@ class Scene {
         gl.deleteTexture(table);
     }
 
-    // What each view saw of the object's outline: a layer of alpha for each.
+    // What each view saw of the object's outline: a layer for each, of alpha, or of what glass covers.
     makeCover(pages, padding) {
         const gl = this.gl, views = this.views;
         const width = Math.max(...views.map((v) => v.width)), height = Math.max(...views.map((v) => v.height));
@@ -248,12 +299,17 @@ class Scene {
                 }
             }
         });
+        const glasses = [];  // by view: 1 where it shows glass
         // Beside a rectangle its padding shows the view.
         const known = covers.map((cover, n) => new Uint8Array(views[n].pruned ? cover.length : 0));
         eachTexel((r, x, y, texel) => {
             if (r.view >= covers.length) return;
-            covers[r.view][y * width + x] = pages[r.page].colour.values[4 * texel + 3];
+            const {colour, glass} = pages[r.page], share = glass ? glass.values[texel] : 0;
+            covers[r.view][y * width + x] = share || colour.values[4 * texel + 3];
             if (views[r.view].pruned) known[r.view][y * width + x] = 1;
+            if (!share) return;
+            glasses[r.view] = glasses[r.view] || new Uint8Array(width * height);
+            glasses[r.view][y * width + x] = 1;
         }, Math.min(padding, 2));
         // Pixels that were left out because other views show them are no background: outsideBits() of lib/packing.
         const pruned = [...covers.keys()].filter((n) => views[n].pruned);
@@ -274,18 +330,24 @@ class Scene {
                 });
             }, 0);
         }
-        const used = covers.map((cover, n) => n).filter((n) => {
+        const open = covers.map((cover, n) => {
             const v = views[n];
             for (let y = 0; y < v.height; ++y)
                 for (let x = 0; x < v.width; ++x)
-                    if (covers[n][y * width + x] !== 255) return true;
+                    if (cover[y * width + x] !== 255) return true;
             return false;
         });
+        // A view that is full of glass is asked for that alone, and only where there are outlines at all.
+        const used = [...covers.keys()].filter((n) => open[n] || (open.includes(true) && glasses[n]));
+        this.hasGlass = glasses.length > 0;
         this.covers = used.map((n, layer) => ({view: views[n], layer}));
         const array = gl.TEXTURE_2D_ARRAY;
         this.cover = makeTexture(gl, array, gl.RG8, gl.RG, gl.UNSIGNED_BYTE, width, height, Math.max(1, used.length));
-        used.forEach((n, layer) => gl.texSubImage3D(array, 0, 0, 0, layer, width, height, 1, gl.RG, gl.UNSIGNED_BYTE,
-                                                    withSurroundings(covers[n], width, views[n].width, views[n].height)));
+        used.forEach((n, layer) => {
+            const {width: across, height: down} = views[n], both = withSurroundings(covers[n], width, across, down);
+            if (glasses[n]) markNearGlass(both, glasses[n], width, across, down);
+            gl.texSubImage3D(array, 0, 0, 0, layer, width, height, 1, gl.RG, gl.UNSIGNED_BYTE, both);
+        });
         gl.texParameteri(array, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
         gl.texParameteri(array, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
     }

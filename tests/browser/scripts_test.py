@@ -149,6 +149,17 @@ def main():
     if found != ["2.000000", "0.100000", "2.000000", "0.523599"]:
         failed += 1
         print(f"FAILED: a view is turned within its bounds as {found} {said}")
+    # Background, a column that glass covers a third of, glass of alpha 60 up to column 15, opaque: tests/unit/render/glass_pages_test.cpp.
+    # With glass up to column 6 only it is an outline.
+    for last, wanted in ((15, [0] * 3 + [85] + [255] * 12 + [0] * 8), (6, ["null"])):
+        alpha = [[0 if x < 3 else 20 if x == 3 else 60 if x <= last else 255 for x in range(24)] for y in range(24)]
+        found, said = node_run(
+            node, folder, ("scene.js",), f"const side = {{width: 24, height: 24}}, alpha = {json.dumps(sum(alpha, []))};"
+            "const found = glassCoverage({...side, values: alpha.flatMap((a) => [0, 0, 0, a])}, {...side, values: alpha});"
+            "console.log(found ? [...found.values].join(' ') : null)")
+        if found != [str(v) for v in wanted] * (24 if found != ["null"] else 1):
+            failed += 1
+            print(f"FAILED: glass up to column {last} covers {found} {said}")
     failed += viewer_failures(node, folder)
     print(f"{failed} failed")
     return 1 if failed else 0

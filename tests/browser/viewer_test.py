@@ -94,6 +94,7 @@ def models(test, browser, args):
     test.stx_run("extract", "atlas", "-o", "atlas.html")
     test.compare(browser, "amphora, pruned, as an atlas", "atlas.html", "atlas", "-1.5,1.4,2.2", "0,0.5,0")
     boxes(test, browser)
+    glass(test, browser)
     coarse_views(test, browser, args.model)
     test.stx_run("extract", "amphora.mp4", "-o", "jpeg.html", "--colour", "jpeg")
     test.compare(browser, "amphora, with JPEG", "jpeg.html", "amphora.mp4", "1.5,1.2,2.5", "0,0.5,0")
@@ -105,6 +106,9 @@ def models(test, browser, args):
     test.compare(browser, "amphora, from above", "amphora.html", "amphora.mp4", "0,3,0", "0,0.5,0")
     test.compare(browser, "amphora, near", "amphora.html", "amphora.mp4", "0.9,1.1,1.1", "0.1,0.7,0")
     test.compare(browser, "amphora, very near", "amphora.html", "amphora.mp4", "0.5,0.6,0.5", "-0.3,0.5,0.3", fov=80)
+    test.stx_run("convert", args.model, "-o", "few.mp4", "--views", "cube", "--size", "128x128")
+    test.stx_run("extract", "few.mp4", "-o", "few.html")
+    test.compare(browser, "amphora, near, of few small views", "few.html", "few.mp4", "0.2,0.6,0.8", "0,0.5,0")
 
 
 def coarse_views(test, browser, model):
@@ -126,17 +130,43 @@ def coarse_views(test, browser, model):
     test.compare(browser, "amphora, coarse views among fine ones", "mixed.html", "mixed.mp4", "1.5,1.2,2.5", "0,0.5,0")
 
 
-def boxes(test, browser):
-    """Straight outlines of a pruned atlas: what its views show beside its rectangles counts. Splats that are larger than the
-    picture end where stx ends them."""
+def write_boxes(path, boxes, first=""):
+    """An OBJ of boxes, each (least corner, size, material or none), that begins with `first`."""
     corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
     faces = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
-    with open(test.path("boxes.obj"), "w", encoding="ascii") as file:
-        for n, (at, size) in enumerate((((-0.5, -0.5, -0.5), (1, 1, 1)), ((0.8, -0.3, -0.2), (0.4, 1.4, 0.3)))):
+    with open(path, "w", encoding="ascii") as file:
+        file.write(first)
+        for n, (at, size, material) in enumerate(boxes):
+            if material:
+                file.write(f"usemtl {material}\n")
             for corner in corners:
                 file.write("v " + " ".join(str(a + s * c) for a, s, c in zip(at, size, corner)) + "\n")
             for face in faces:
                 file.write("f " + " ".join(str(8 * n + k) for k in face) + "\n")
+
+
+def glass(test, browser):
+    """Glass hides what is behind it whatever its alpha is, and its outlines keep that alpha."""
+    write_boxes(test.path("glass.obj"), [((-0.5, -0.5, -0.5), (1, 1, 1), "faint"), ((0.8, -0.3, -0.2), (0.4, 1.4, 0.3), "dim"),
+                                         ((-1.6, -0.4, -1.2), (0.6, 0.9, 2), "full")], "mtllib glass.mtl\n")
+    with open(test.path("glass.mtl"), "w", encoding="ascii") as file:
+        for name, colour, alpha in (("faint", "0.9 0.3 0.2", 0.3), ("dim", "0.2 0.8 0.3", 0.75), ("full", "0.3 0.4 0.9", 1)):
+            file.write(f"newmtl {name}\nKd {colour}\nd {alpha}\n")
+    # Rectangles of a pruned atlas may lie on their side.
+    test.stx_run("convert", "glass.obj", "-o", "glass.mp4", "--views", "sphere:12", "--size", "128x128")
+    test.stx_run("pack", "glass.mp4", "-o", "glass", "--prune", "--layout", "tight")
+    for name, source in (("", "glass.mp4"), (", pruned, as an atlas", "glass")):
+        test.stx_run("extract", source, "-o", "glass.html")
+        test.compare(browser, "glass" + name, "glass.html", source, "2,1.5,4", "0,0,0")
+        test.compare(browser, f"glass{name}, under a light", "glass.html", source, "-3,1,3", "0,0,0", light=True)
+    test.stx_run("extract", "glass.mp4", "-o", "glass.html", "--colour", "jpeg")
+    test.compare(browser, "glass, with JPEG", "glass.html", "glass.mp4", "2,1.5,4", "0,0,0")
+
+
+def boxes(test, browser):
+    """Straight outlines of a pruned atlas: what its views show beside its rectangles counts. Splats that are larger than the
+    picture end where stx ends them."""
+    write_boxes(test.path("boxes.obj"), [((-0.5, -0.5, -0.5), (1, 1, 1), None), ((0.8, -0.3, -0.2), (0.4, 1.4, 0.3), None)])
     test.stx_run("convert", "boxes.obj", "-o", "boxes.exr", "--views", "sphere:12", "--size", "128x128")
     test.stx_run("pack", "boxes.exr", "-o", "boxes", "--prune", "--layout", "tight")
     test.stx_run("extract", "boxes", "-o", "boxes.html")

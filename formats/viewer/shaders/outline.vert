@@ -12,8 +12,9 @@ void main() {
     ivec3 texel;
     if (!texelOf(block, u, v, texel)) return;
     uint code = texelFetch(depthTexture, texel, 0).r;
-    if (code == 0u || !(texelFetch(colourTexture, texel, 0).a >= 0.5)) return;
-    Point p = pointOf(int(block.z), code);
+    float alpha = texelFetch(colourTexture, texel, 0).a;
+    if (code == 0u || !hides(texel, alpha)) return;
+    Point p = pointOf(int(block.z), code, alpha);
     if (!placePoint(p, float(u), float(v))) return;
     centre = p.pixel;
     gl_Position = vec4((floor(p.pixel + 0.5) + 0.5) / frameSize * 2.0 - 1.0, 0.0, 1.0);

@@ -4,6 +4,8 @@
 uniform sampler2D givenNormals;  // 0..1, zero = none
 uniform sampler2D givenSplats;   // tilt along u and v, size; zero = none
 uniform bvec2 given;                  // normals, splats
+uniform sampler2D glassTexture;       // how much of a texel glass covers (scene.js)
+uniform bool hasGlass;
 uniform ivec4 area;                   // first texel, size
 uniform ivec4 around;                 // texels on the left, on top, right and below that show the view, too
 uniform vec4 sourceLens;              // fx, fy, cx, cy
@@ -15,6 +17,7 @@ layout(location = 1) out vec4 normalOut;
 
 const float kSteepest = 8.0, kAlike = 0.05, kSteepestRim = 1.0, kCreaseFactor = 3.0, kCreaseMore = 0.5;
 const float kNone = 3.0e38;
+const float kHalfGlass = 127.5 / 255.0;  // lib/render/scene/glass_pages.hpp
 
 bool orthographic() { return planes.w != 0.0; }
 ivec3 texelAt(ivec2 at) { return ivec3(area.xy + at, layer); }
@@ -117,7 +120,9 @@ void main() {
     bool rim = !thin && any(behind);
     if (rim && !hasSplat) slope = clamp(slope, vec2(-kSteepestRim), vec2(kSteepestRim));
     ivec2 coded = ivec2(round(clamp(slope, vec2(-kSteepest), vec2(kSteepest)) * kSlopeScale));
-    slopeOut.xy = (coded & ivec2(~1)) | ivec2(linked, rim);
+    // Points of glass are never linked: the bit says of those that are not opaque that they are glass.
+    bool isGlass = hasGlass && texelFetch(glassTexture, texelAt(at).xy, 0).r > kHalfGlass;
+    slopeOut.xy = (coded & ivec2(~1)) | ivec2(linked || isGlass, rim);
     if (!hasNormal) normal = worldFromSource * normalFromSlope(slope, ray);
     normalOut = vec4(normal * 0.5 + 0.5, 1.0);
 }

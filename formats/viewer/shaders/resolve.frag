@@ -31,7 +31,7 @@ void main() {
     if (!(sum.a > 0.0)) return;
     float alpha = min(more.a / sum.a, 1.0);
     // Without a front only faint splats of a silhouette count, not the skirts of full ones.
-    if (!(front < 1.0) && !(alpha < 0.5)) return;
+    if (!(front < 1.0) && !(alpha < kSkirts)) return;
     picture = vec4(clamp(sum.rgb / sum.a, vec3(0.0), vec3(alpha)), alpha);
     if (!lit || !(alpha > 0.0) || !(dot(more.xyz, more.xyz) > 0.0)) return;
     vec2 ray = (vec2(at) - lens.zw) * lens.xy * vec2(1.0, -1.0);

@@ -1,6 +1,5 @@
 // A vertex is a point. PASS 1 finds the front of each pixel, PASS 2 adds the colours of what lies there.
 #include "formats/viewer/shaders/points.glsl"
-uniform isampler2DArray slopeTexture;
 uniform sampler2DArray normalTexture;
 uniform vec4 lens;        // 1 / fx, 1 / fy, cx, cy: pixel centres at whole numbers
 uniform float splatSize;  // 1 = what the data says
@@ -56,9 +55,9 @@ void main() {
     if (code == 0u) return;
     vec4 rgba = texelFetch(colourTexture, texel, 0);
     // Pixels less than half covered belong to the silhouette: they lend colour but hide nothing.
-    if (!(rgba.a > (PASS == 1 ? 0.5 : 0.0))) return;
+    if (!(rgba.a > 0.0) || (PASS == 1 && !hides(texel, rgba.a))) return;
 
-    Point p = pointOf(rectangle, code);
+    Point p = pointOf(rectangle, code, rgba.a);
     if (!placePoint(p, float(u), float(v))) return;
     p.task.quality = qualityOf(rectangle, p);
     ivec4 coded = texelFetch(slopeTexture, texel, 0);
