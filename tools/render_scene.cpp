@@ -28,10 +28,13 @@ void noteUnused(const Model& model, const RenderOptions& o, const Command& comma
     const auto note = [&](const std::vector<std::string>& options, const char* why) {
         program.job.noteUnused(options, "", why);
     };
-    const auto kind = recognise(o.input);
-    if (!o.open.set.from.empty() || !kind || *kind != FileKind::mpeg4)
-        program.job.noteUnused(command.given({"--times-from-start"}), "of MPEG-4 scenes",
-                               fmt::format("'{}' is {}", o.input, kind ? nameOf(*kind) : "none"));
+    if (o.open.timesFromStart) {  // asked first: headers of many views are much to read
+        const auto kind = recognise(o.input);
+        if (!o.open.set.from.empty() || !kind || *kind != FileKind::mpeg4)
+            program.job.noteUnused(
+                {"--times-from-start"}, "of MPEG-4 scenes",
+                fmt::format("'{}' is {}", o.input, kind ? nameOf(*kind) : "none"));
+    }
     if (std::holds_alternative<Mesh>(model)) {
         program.job.noteUnused(command.given({"--time", "--times"}), "of films",
                                fmt::format("'{}' is a mesh", o.input));
