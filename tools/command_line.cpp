@@ -111,7 +111,7 @@ void addNamedPaths(const CLI::Option& option, const std::string& replaces,
         to.push_back({name, pathOfValue(text), replaces});
 }
 
-/// Whether it stands alone and names inputs: it is no word from a list.
+/// Whether it stands alone and names inputs: its values are not words from a list.
 bool namesInputs(const CLI::Option& option) {
     return option.get_positional() && optionRow(option).choices.empty();
 }

@@ -47,7 +47,7 @@ class MergedReport {
     [[nodiscard]] Result<void> checkInputs(const std::vector<std::string>& names) const;
 
     /// The outputs that are reported as done or skipped, by index. Error (invalidInput): a name
-    /// that reports do not hold as it is, since it is no UTF-8.
+    /// that reports do not hold as it is, since it is not UTF-8.
     [[nodiscard]] Result<std::vector<std::string>> outputs() const;
 
     /// The joined report: JSON lines, or one report of all pictures; each entry once, by index.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "lib/model/view_table.hpp"
@@ -18,9 +19,10 @@ struct AtlasLayout {
 /// Points, and pixels of full alpha without a distance.
 [[nodiscard]] std::int64_t objectPixels(const ReferenceView& view);
 
-/// Pixels of full alpha without a distance that nobody took away: of views that fill their frames,
-/// with unknown depth, not pruned and no background; of others 0.
-[[nodiscard]] std::int64_t unmeasuredPixels(const ReferenceView& view);
+/// Whether pixels of full alpha without a distance are such as nobody took away: the view fills its
+/// frame, its missing depth is unknown, and it is neither pruned nor background. `masked`: what
+/// lacksDepthByMask() says, where that is known.
+[[nodiscard]] bool mayBeUnmeasured(const ReferenceView& view, std::optional<bool> masked = {});
 
 /// The least power of two that is not below, of 1 .. 2^30.
 [[nodiscard]] int powerOfTwoFrom(int size);

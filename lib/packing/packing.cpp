@@ -184,11 +184,9 @@ void dropIfZero(Image<T>& image) {
 
 }  // namespace
 
-std::int64_t unmeasuredPixels(const ReferenceView& view) {
-    if (view.noDepth != NoDepth::unknown || view.pruned || view.background ||
-        lacksDepthByMask(view))
-        return 0;
-    return objectPixels(view) - view.pointCount();
+bool mayBeUnmeasured(const ReferenceView& view, std::optional<bool> masked) {
+    return view.noDepth == NoDepth::unknown && !view.pruned && !view.background &&
+           !(masked ? *masked : lacksDepthByMask(view));
 }
 
 std::int64_t objectPixels(const ReferenceView& view) {
@@ -375,9 +373,9 @@ Result<Atlas> pack(const ViewTable& table, const PackSettings& settings, Job& jo
             object[i] = objectPixels(*view);
             points[i] = view->pointCount();
             if (!tight) return {};
-            unmeasured[i] = unmeasuredPixels(*view);
             // What the rectangles leave out decides with what they show.
             if (view->noDepth == NoDepth::unknown) masked[i] = lacksDepthByMask(*view);
+            if (mayBeUnmeasured(*view, masked[i])) unmeasured[i] = object[i] - points[i];
             return {};
         }));
     for (std::size_t k = 0; k < source.size(); ++k) atlas.views[k].masked = masked[source[k]];

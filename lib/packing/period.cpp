@@ -53,7 +53,8 @@ PruneReport PackPeriod::prune(Bundle& frame) const {
     std::vector<std::int64_t> object(frame.views.size()), unmeasured(object.size());
     parallelFor(0, frame.views.size(), [&](std::size_t k) {
         object[k] = objectPixels(frame.views[k]);
-        unmeasured[k] = unmeasuredPixels(frame.views[k]);
+        if (mayBeUnmeasured(frame.views[k]))
+            unmeasured[k] = object[k] - frame.views[k].pointCount();
         Image<std::uint8_t> kept = views_[k].kept;
         for (std::size_t p = 0; p < kept.count(); ++p)
             kept.data()[p] &= hasPoint(frame.views[k].depth.data()[p]) ? 1 : 0;

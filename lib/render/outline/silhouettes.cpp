@@ -328,33 +328,29 @@ void Silhouettes::carve(Frame& frame, const Camera& camera, const Extent& drawn)
                     covered_.at(x, y) = coverage(camera, maps, x, y, frame.depth, seesPast);
                 });
     });
+    // Calls for each pixel that has a share.
+    const auto forShares = [&](const auto& call) {
+        inRows([&](int from, int to) {
+            for (int y = from; y < to; ++y)
+                forWhere(
+                    partOf(y), [](float c) { return c >= 0.0f; },
+                    [&](int column) { call(part.x0 + column, y); });
+        });
+    };
     if (!glassViews_.empty()) {
         Maps glassMaps;
         for (const GlassView& view : glassViews_)
             glassMaps.push_back(pixelMap(camera, view.camera));
         // Before any pixel is changed: what is around one is looked at.
-        inRows([&](int from, int to) {
-            for (int y = from; y < to; ++y)
-                forWhere(
-                    partOf(y), [](float c) { return c >= 0.0f; },
-                    [&](int column) {
-                        const int x = part.x0 + column;
-                        if (!nearGlass(glassMaps, x, y, frame.depth.at(x, y))) return;
-                        float& share = covered_.at(x, y);
-                        // Something opaque around it does not make glass opaque.
-                        share = std::min(share * alphaAround(frame, x, y), frame.colour.at(x, y).a);
-                    });
+        forShares([&](int x, int y) {
+            if (!nearGlass(glassMaps, x, y, frame.depth.at(x, y))) return;
+            float& share = covered_.at(x, y);
+            // Something opaque around it does not make glass opaque.
+            share = std::min(share * alphaAround(frame, x, y), frame.colour.at(x, y).a);
         });
     }
-    inRows([&](int from, int to) {
-        for (int y = from; y < to; ++y)
-            forWhere(
-                partOf(y), [](float c) { return c >= 0.0f; },
-                [&](int column) {
-                    const int x = part.x0 + column;
-                    setCoverage(frame, x, y, std::exchange(covered_.at(x, y), -1.0f));
-                });
-    });
+    forShares(
+        [&](int x, int y) { setCoverage(frame, x, y, std::exchange(covered_.at(x, y), -1.0f)); });
 }
 
 }  // namespace stx

@@ -141,7 +141,7 @@ class Lookup {
         const float* depth;
         const Slope* slope;
         float dist, spacing;  ///< of the point that is looked up
-        bool opaque;          ///< not looked at where there is no glass: no other has kLinked
+        bool opaque;          ///< true without a look where nothing is glass: linked points are
     };
     [[nodiscard]] bool find(int x, int y, Place& place) const {
         if (set_.views()[view_].unread) return false;

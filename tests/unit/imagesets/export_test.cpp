@@ -47,6 +47,12 @@ INSTANTIATE_TEST_SUITE_P(All, Export,
                          ::testing::Combine(::testing::Values(Kind::transforms, Kind::miv),
                                             ::testing::Values(8, 16, 32), ::testing::Bool()));
 
+auto exportColmap(const Bundle& bundle, const std::filesystem::path& folder, Job& job) {
+    ExportOptions options;
+    options.kind = Kind::colmap;
+    return exportViews(*viewsOf(bundle), folder, options, job);
+}
+
 /// COLMAP has no mark for it: what is opaque without depth says it.
 TEST(Export, CutOutsOfColmapKeepWhatIsNotKnown) {
     Bundle bundle = smallBundle(2, 32, false, false);
@@ -68,9 +74,7 @@ TEST(Export, CutOutsOfColmapKeepWhatIsNotKnown) {
     ASSERT_NE(hole, 0);
     TemporaryFolder folder;
     Job job;
-    ExportOptions options;
-    options.kind = Kind::colmap;
-    const auto written = exportViews(*viewsOf(bundle), folder / "set", options, job);
+    const auto written = exportColmap(bundle, folder / "set", job);
     ASSERT_TRUE(written) << written.error().text();
     ImageSetOptions reading;
     reading.refine = *RefineSettings::from("off");
@@ -89,9 +93,7 @@ TEST(Export, ColmapHasNoBackgroundViews) {
     bundle.views[0].background = true;
     TemporaryFolder folder;
     Job job;
-    ExportOptions options;
-    options.kind = Kind::colmap;
-    const auto written = exportViews(*viewsOf(bundle), folder / "set", options, job);
+    const auto written = exportColmap(bundle, folder / "set", job);
     ASSERT_TRUE(written) << written.error().text();
     const auto notes = job.takeNotes();
     ASSERT_EQ(notes.size(), 1u);
@@ -104,7 +106,7 @@ TEST(Export, ColmapHasNoBackgroundViews) {
     EXPECT_EQ(back->views[0].depth.size(), bundle.views[1].depth.size());
     // Of backgrounds alone there is nothing to write.
     bundle.views[1].background = true;
-    const auto none = exportViews(*viewsOf(bundle), folder / "none", options, job);
+    const auto none = exportColmap(bundle, folder / "none", job);
     ASSERT_FALSE(none);
     EXPECT_EQ(none.error().code, ErrorCode::invalidInput);
     EXPECT_FALSE(std::filesystem::exists(folder / "none"));
@@ -119,9 +121,7 @@ TEST(Export, ColmapSaysWhatLinearColoursLose) {
                 c = glm::vec4(glm::vec3(c) / 4.0f, c.a);
         TemporaryFolder folder;
         Job job;
-        ExportOptions options;
-        options.kind = Kind::colmap;
-        const auto written = exportViews(*viewsOf(bundle), folder / "set", options, job);
+        const auto written = exportColmap(bundle, folder / "set", job);
         ASSERT_TRUE(written) << written.error().text();
         EXPECT_EQ(job.takeNotes(),
                   std::vector<std::string>{
